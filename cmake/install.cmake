@@ -1,0 +1,31 @@
+# cmake --install, and the package that find_package(prolate [COMPONENTS query builder]) reads.
+include(CMakePackageConfigHelpers)
+
+install(TARGETS prolate_core prolate_query EXPORT prolate-query-targets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+set(prolate_headers error.hpp types.hpp tree.hpp query.hpp version.hpp glm.hpp)
+install(EXPORT prolate-query-targets NAMESPACE prolate::
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
+
+if(PROLATE_BUILD_BUILDER)
+  install(TARGETS prolate_builder EXPORT prolate-builder-targets
+    ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(EXPORT prolate-builder-targets NAMESPACE prolate::
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
+  list(APPEND prolate_headers mesh.hpp build.hpp verify.hpp eigen.hpp)
+endif()
+if(PROLATE_BUILD_CLI)
+  install(TARGETS prolate_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+
+list(TRANSFORM prolate_headers PREPEND ${PROJECT_SOURCE_DIR}/include/prolate/)
+install(FILES ${prolate_headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/prolate)
+
+configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/prolate-config.cmake.in
+  ${PROJECT_BINARY_DIR}/prolate-config.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/prolate-config-version.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/prolate-config.cmake ${PROJECT_BINARY_DIR}/prolate-config-version.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE-APACHE ${PROJECT_SOURCE_DIR}/LICENSE-MIT ${PROJECT_SOURCE_DIR}/LICENSE
+  DESTINATION ${CMAKE_INSTALL_DOCDIR} OPTIONAL)

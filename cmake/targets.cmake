@@ -1,0 +1,31 @@
+# prolate_target(TARGET): what every target of this project is built with.
+#
+# Floating point is pinned, because baked bytes and query results must not depend on the compiler: no contraction into
+# fused multiply-adds, and never -march=native (README, "Determinism").
+function(prolate_target target)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE
+    -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+  if(PROLATE_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  if(PROLATE_SANITIZE)
+    # PUBLIC link: whoever links an instrumented library needs the runtime.
+    target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize-recover=all
+      -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=address,undefined)
+  endif()
+endfunction()
+
+# prolate_library(NAME SOURCES...): the static library prolate_NAME, alias and export name prolate::NAME.
+function(prolate_library name)
+  add_library(prolate_${name} STATIC ${ARGN})
+  add_library(prolate::${name} ALIAS prolate_${name})
+  set_target_properties(prolate_${name} PROPERTIES EXPORT_NAME ${name})
+  target_include_directories(prolate_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  # Sources name internal headers by folder: "src/symmetric3.hpp". tests/layering.cmake checks who may name whom.
+  target_include_directories(prolate_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  prolate_target(prolate_${name})
+endfunction()

@@ -1,0 +1,42 @@
+// Proof that a tree covers a mesh, independent of how the tree was built.
+#pragma once
+
+#include <prolate/mesh.hpp>
+#include <prolate/tree.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace prolate {
+
+/// Verdict on one level's cut.
+struct LevelProof {
+    bool covered = false;         ///< proved: every point of the solid lies in an ellipsoid of the cut
+    bool has_counterexample = false; ///< `point` belongs to the solid and lies in no ellipsoid of the cut
+    double point[3] = {};         ///< the counterexample, or where the subdivision gave up
+    double depth = 0;             ///< of the counterexample: smallest radial excess |L^-1 (p - c)| - 1 over the cut
+    uint64_t pieces = 0;          ///< pieces of the solid that were looked at
+};
+
+struct VerifyReport {
+    bool covered = false;      ///< every level is
+    bool surface_mode = false; ///< the mesh is open: its triangles were proved, there is no inside
+    std::vector<LevelProof> levels;
+};
+
+/// Options of verify().
+struct VerifyOptions {
+    uint32_t threads = 0; ///< 0 = all cores
+    /// Called between pieces of work with the fraction done; return false to cancel.
+    std::function<bool(double)> progress;
+};
+
+/// Proves each level of `tree` by adaptive subdivision of space: a cell is done when all of the solid in it (triangles
+/// clipped to the cell, and its corners inside the solid) lies in one ellipsoid of the *decoded* tree, because then,
+/// an ellipsoid being convex, everything in between does. A point of the solid in no ellipsoid ends the proof as a
+/// counterexample; a cell that cannot be decided at 1e-9 of the mesh's size ends it as "not proved". Thread-safe.
+/// Fails with bad_mesh or cancelled.
+Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options = {});
+
+} // namespace prolate

@@ -1,0 +1,61 @@
+// The .etree format: the only file, with format.cpp, that knows offsets. src/FORMAT.md is normative.
+//
+// A node's numbers are integers times powers of two, so that decoding is exact and the same everywhere:
+//     center = (origin + q) * 2^step_exponent           q: three uint16, |origin + q| < 2^24: exact in a float
+//     l_ii   = d_i * 2^(exponent - 16)                  d: three uint16, 1 ... 65535
+//     l_ij   = o_j * 2^(exponent - 15)                  o: three int16
+// Writing rounds to nearest; the builder then scales the *decoded* ellipsoid until it covers (builder/cover.cpp).
+#pragma once
+
+#include <prolate/tree.hpp>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace prolate::format {
+
+/// The lattice that centers lie on.
+struct Lattice {
+    int32_t origin[3] = {};
+    int32_t step_exponent = 0;
+};
+
+inline constexpr int32_t kMaxCoordinate = 1 << 24; ///< |origin + q| stays below: integers that a float holds exactly
+inline constexpr int32_t kMinStepExponent = -120, kMaxStepExponent = 60;
+inline constexpr int32_t kMinNodeExponent = -100, kMaxNodeExponent = 100;
+
+/// A node as stored.
+struct PackedNode {
+    uint32_t first_child = 0;
+    uint16_t center[3] = {};
+    uint16_t diagonal[3] = {1, 1, 1};  // l11, l22, l33
+    int16_t off_diagonal[3] = {};      // l21, l31, l32
+    int8_t exponent = 0;
+    uint8_t child_count = 0;
+};
+
+/// Lattice for centers inside the box [low, high], all finite: the finest step for which 16 bits reach across and a
+/// float holds every center exactly.
+Lattice lattice_for(const double low[3], const double high[3]) noexcept;
+
+/// Nearest representable node to {center + L u}; child fields are left alone. `factor` = l11, l21, l22, l31, l32, l33.
+/// Components beyond the lattice are clamped to its border.
+void quantise(PackedNode& node, const Lattice& lattice, const double center[3], const double factor[6]) noexcept;
+
+/// Exactly what TreeView::ellipsoid returns for the node.
+Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept;
+
+/// One level to be written.
+struct PackedLevel {
+    std::vector<PackedNode> nodes; ///< in order; children of earlier nodes first; first_child is filled by encode()
+    float outside_ratio = 0;
+    float surface_error = 0;
+};
+
+/// The bytes of a whole file. Sets first_child from the child counts. The caller keeps the invariants of FORMAT.md
+/// (counts that add up, degree and level limits).
+std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
+                              std::span<const PackedLevel> levels);
+
+} // namespace prolate::format
