@@ -1,0 +1,42 @@
+# link_closure(OUT TARGET): names of everything that TARGET links, directly or not, privately or not.
+#
+# Names whose targets are not visible here (imported ones of other folders) are listed but not followed: they are
+# other people's libraries, and to name one is enough.
+function(link_closure out target)
+  set(todo ${target})
+  set(seen "")
+  while(todo)
+    list(POP_FRONT todo name)
+    if(NOT TARGET ${name})
+      continue()
+    endif()
+    foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
+      get_target_property(links ${name} ${property})
+      if(NOT links)
+        continue()
+      endif()
+      # Whatever a generator expression would choose, count it as linked.
+      string(REGEX REPLACE "\\$<[A-Z_]+:|[<>]|\\$" "" links "${links}")
+      foreach(link IN LISTS links)
+        if(NOT link STREQUAL "" AND NOT link IN_LIST seen)
+          list(APPEND seen ${link})
+          list(APPEND todo ${link})
+        endif()
+      endforeach()
+    endforeach()
+  endwhile()
+  set(${out} "${seen}" PARENT_SCOPE)
+endfunction()
+
+# test_links(NAME TARGET ALLOWED): a test that TARGET's closure matches the regular expression ALLOWED name by name.
+function(test_links name target allowed)
+  link_closure(closure ${target})
+  list(FILTER closure EXCLUDE REGEX "^(${allowed})$")
+  if(closure)
+    set(verdict "${target} may not link: ${closure}")
+  else()
+    set(verdict "${target}: all links allowed")
+  endif()
+  add_test(NAME ${name} COMMAND ${CMAKE_COMMAND} -E echo "${verdict}")
+  set_tests_properties(${name} PROPERTIES PASS_REGULAR_EXPRESSION "all links allowed" ${ARGN})
+endfunction()
