@@ -12,6 +12,7 @@ cmake_minimum_required(VERSION 3.25)
 # *_libraries: other people's headers. The C++ standard library is always allowed.
 set(layers include/prolate src query builder cli)
 set(core_headers "types|error|tree|version")
+set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
 set(include/prolate_headers ".*")
 set(include/prolate_folders "none")
@@ -19,7 +20,7 @@ set(include/prolate_libraries "none")
 
 set(src_headers "${core_headers}")
 set(src_folders "src")
-set(src_libraries "xxhash\\.h|fcntl\\.h|unistd\\.h|sys/.*")
+set(src_libraries "xxhash\\.h|${posix}")
 
 set(query_headers "${core_headers}|query|glm")
 set(query_folders "src|query")
@@ -27,11 +28,12 @@ set(query_libraries "glm/.*")
 
 set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
-set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h")
+set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
 set(cli_headers ".*")
 set(cli_folders "src|builder|query|cli")
-set(cli_libraries "CLI/.*|fmt/.*|nlohmann/.*|png\\.h|embree3/.*|tbb/.*|oneapi/tbb/.*|[a-z]+\\.h|sys/.*")
+set(cli_libraries
+  "CLI/.*|fmt/.*|nlohmann/.*|png\\.h|embree3/.*|glm/.*|tbb/.*|oneapi/tbb/.*|ft2build\\.h|freetype/.*|fontconfig/.*|${posix}")
 
 # Single files that may have one library more: the gateways.
 set(extra_include/prolate/eigen.hpp "Eigen/.*")
