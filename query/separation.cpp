@@ -1,0 +1,128 @@
+#include "query/separation.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace prolate::query {
+namespace {
+
+using glm::dmat3;
+using glm::dvec3;
+
+// Steps in log(rho) are at most log(19); the loop ends when a step can improve f by less than this, relatively.
+constexpr double kLargestStep = 0.9;
+constexpr double kSmallestGain = 0x1p-50;
+
+dvec3 to_double(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+
+// Rotation of a quaternion of any length but 0. Squares and products of floats are exact in double.
+dmat3 rotation_matrix(const Quat& q) {
+    const double x = q.x, y = q.y, z = q.z, w = q.w;
+    const double s = 2 / (x * x + y * y + z * z + w * w);
+    return {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)}, // columns
+            {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
+            {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}};
+}
+
+double trace(const dmat3& m) {
+    return m[0][0] + m[1][1] + m[2][2];
+}
+
+double frobenius(const dmat3& m) {
+    return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+}
+
+// Adjugate of a symmetric matrix: adj(Q) Q = det(Q) I.
+dmat3 adjugate(const dmat3& q) {
+    const double a = q[1][1] * q[2][2] - q[1][2] * q[1][2];
+    const double b = q[0][2] * q[1][2] - q[0][1] * q[2][2];
+    const double c = q[0][1] * q[1][2] - q[0][2] * q[1][1];
+    const double d = q[0][0] * q[2][2] - q[0][2] * q[0][2];
+    const double e = q[0][1] * q[0][2] - q[0][0] * q[1][2];
+    const double f = q[0][0] * q[1][1] - q[0][1] * q[0][1];
+    return {{a, b, c}, {b, d, e}, {c, e, f}};
+}
+
+dmat3 factor_of(const Ellipsoid& e) {
+    return {{e.l11, e.l21, e.l31}, {0, e.l22, e.l32}, {0, 0, e.l33}}; // columns
+}
+
+} // namespace
+
+RelativePose relative_pose(const Pose& a, const Pose& b) noexcept {
+    const dmat3 rotation_a = rotation_matrix(a.rotation), rotation_b = rotation_matrix(b.rotation);
+    const dvec3 d = to_double(b.translation) - to_double(a.translation);
+    RelativePose out{glm::transpose(rotation_a) * rotation_b, d * rotation_a, glm::length(d)};
+    const double sum = trace(out.rotation) + out.translation.x + out.translation.y + out.translation.z + out.distance;
+    if (!std::isfinite(sum)) {
+        const double nan = std::numeric_limits<double>::quiet_NaN();
+        out = {dmat3(dvec3(nan), dvec3(nan), dvec3(nan)), dvec3(nan), nan};
+    }
+    return out;
+}
+
+PlacedEllipsoid place(const Ellipsoid& e) noexcept {
+    PlacedEllipsoid out{to_double(e.center), factor_of(e), 0, 0};
+    out.size = frobenius(out.factor);
+    out.reach = glm::length(out.center) + out.size;
+    return out;
+}
+
+PlacedEllipsoid place(const Ellipsoid& e, const RelativePose& b_to_a) noexcept {
+    PlacedEllipsoid out = place(e);
+    out.reach += b_to_a.distance;
+    out.center = b_to_a.rotation * out.center + b_to_a.translation;
+    out.factor = b_to_a.rotation * out.factor;
+    return out;
+}
+
+PairResult test_pair(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double separation_margin) noexcept {
+    const dvec3 r = b.center - a.center;
+    const double scale = a.reach + b.reach; // S of the error analysis
+    const dmat3 q1 = a.factor * glm::transpose(a.factor), q2 = b.factor * glm::transpose(b.factor);
+    double rho = std::sqrt(trace(q1) / trace(q2)); // exact for spheres
+    double low = 0, high = std::numeric_limits<double>::infinity();
+
+    for (uint32_t evaluations = 1;; ++evaluations) {
+        dmat3 q = q1 + rho * q2;
+        const double tau = trace(q);
+        q *= 1 / tau;
+        const dmat3 adj = adjugate(q);
+        const double det = glm::dot(q[0], adj[0]);
+        dvec3 n = adj * r;
+        const double n_scale = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
+        if (n_scale > 0) n /= n_scale;
+        const double alpha = glm::length(n * a.factor), beta = glm::length(n * b.factor);
+
+        // Every comparison is written so that a NaN fails it.
+        if (glm::dot(n, r) - alpha - beta > separation_margin * glm::length(n) * scale)
+            return {PairVerdict::separated, evaluations};
+        const double room = tau * (det - kOverlapMargin), slack = kOverlapMargin * scale;
+        if (n_scale * alpha + slack * a.size <= room && rho * (n_scale * beta + slack * b.size) <= room)
+            return {PairVerdict::overlapping, evaluations};
+        if (evaluations == kMaxEvaluations) return {PairVerdict::unresolved, evaluations};
+
+        // Newton on phi(log rho) = log(alpha / (rho beta)), which falls monotonically:
+        //     phi' = -(k - h) / alpha^2 - (k - h) / k,  k = rho beta^2,  h = rho^2 (Q2 n)^T Q^-1 (Q2 n) in [0, k].
+        // log y is replaced by 2 (y - 1) / (y + 1) and exp by its inverse, so that phi' = -1 gives the fixed-point step
+        // rho = alpha / beta, and no library function but sqrt is used.
+        const double excess = (alpha - rho * beta) / (alpha + rho * beta);
+        const dvec3 w = q2 * n;
+        const double k = rho * beta * beta;
+        const double h = std::clamp(rho * rho * glm::dot(w, adj * w) / (tau * det), 0.0, k);
+        const double slope = (k - h) / (alpha * alpha) + (k - h) / k;
+        const double step = std::clamp(excess / slope, -kLargestStep, kLargestStep);
+        if (!(excess * step > kSmallestGain)) return {PairVerdict::unresolved, evaluations};
+        (excess > 0 ? low : high) = rho;
+        rho *= (1 + step) / (1 - step);
+        if (!(rho > low && rho < high)) rho = std::sqrt(low * high);
+    }
+}
+
+} // namespace prolate::query
