@@ -5,11 +5,9 @@
 #include "src/format.hpp"
 
 #include "src/bytes.hpp"
+#include "src/hash.hpp"
 
 #include <prolate/version.hpp>
-
-#define XXH_INLINE_ALL
-#include <xxhash.h>
 
 #include <algorithm>
 #include <cassert>
@@ -81,16 +79,10 @@ uint64_t end_of_nodes(uint32_t level_count, uint64_t nodes) {
     return kHeaderBytes + uint64_t{level_count} * kLevelBytes + nodes * kNodeBytes;
 }
 
-// Hash of header and levels table with the hash field itself taken as zero.
+// Hash of header and levels table without the hash field itself.
 uint64_t header_hash(std::span<const std::byte> header_and_table) {
-    static constexpr std::byte kZero[8] = {};
-    XXH3_state_t state;
-    XXH3_64bits_reset(&state);
-    XXH3_64bits_update(&state, header_and_table.data(), kAtHeaderHash);
-    XXH3_64bits_update(&state, kZero, sizeof kZero);
-    XXH3_64bits_update(&state, header_and_table.data() + kAtHeaderHash + 8,
-                       header_and_table.size() - kAtHeaderHash - 8);
-    return XXH3_64bits_digest(&state);
+    const uint64_t before = hash_bytes(header_and_table.first(kAtHeaderHash));
+    return hash_bytes(header_and_table.subspan(kAtHeaderHash + 8), before);
 }
 
 Error bad(const char* what, uint64_t where) {
@@ -279,7 +271,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         store_le(row + kLevelFirstNode, first_node);
         store_le(row + kLevelNodeCount, count);
         store_le(row + kLevelEndByte, end_of_nodes(level_count, uint64_t{first_node} + count));
-        store_le(row + kLevelHash, uint64_t{XXH3_64bits(begin, size_t{count} * kNodeBytes)});
+        store_le(row + kLevelHash, hash_bytes({begin, size_t{count} * kNodeBytes}));
         store_le(row + kLevelOutsideRatio, level.outside_ratio);
         store_le(row + kLevelSurfaceError, level.surface_error);
         first_node += count;
@@ -340,7 +332,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         view.node_count_ = level.first_node + level.node_count;
         const std::byte* const begin = view.nodes_ + size_t{level.first_node} * kNodeBytes;
         const size_t begin_byte = table_end + size_t{level.first_node} * kNodeBytes;
-        if (options.check_hash && XXH3_64bits(begin, size_t{level.node_count} * kNodeBytes) !=
+        if (options.check_hash && hash_bytes({begin, size_t{level.node_count} * kNodeBytes}) !=
                                       load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
             return bad("the nodes of a level are damaged (hash mismatch)", begin_byte);
         for (uint32_t i = 0; i < level.node_count; ++i) {

@@ -1,0 +1,27 @@
+// The builder's only gateway to Eigen: the vector types that its files share.
+#pragma once
+
+#include <Eigen/Core>
+
+#include <prolate/types.hpp>
+
+namespace prolate {
+
+using Vec = Eigen::Vector3d;
+using Mat = Eigen::Matrix3d;
+
+inline Vec to_vec(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+
+/// Axis-aligned box; empty until something is added.
+struct Box {
+    Vec low = Vec::Constant(HUGE_VAL), high = Vec::Constant(-HUGE_VAL);
+    void add(const Vec& p) { low = low.cwiseMin(p), high = high.cwiseMax(p); }
+    void add(const Box& b) { low = low.cwiseMin(b.low), high = high.cwiseMax(b.high); }
+    Vec center() const { return 0.5 * (low + high); }
+    Vec size() const { return high - low; }
+    Vec corner(unsigned i) const { return {i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()}; }
+};
+
+} // namespace prolate

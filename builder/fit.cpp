@@ -1,0 +1,230 @@
+#include "builder/fit.hpp"
+
+#include "src/symmetric3.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace prolate {
+namespace {
+
+// Lower Cholesky factor in a fixed order of operations.
+Mat cholesky(const Mat& q) {
+    Mat l = Mat::Zero();
+    l(0, 0) = std::sqrt(q(0, 0));
+    l(1, 0) = q(1, 0) / l(0, 0);
+    l(2, 0) = q(2, 0) / l(0, 0);
+    l(1, 1) = std::sqrt(q(1, 1) - l(1, 0) * l(1, 0));
+    l(2, 1) = (q(2, 1) - l(2, 0) * l(1, 0)) / l(1, 1);
+    l(2, 2) = std::sqrt(q(2, 2) - l(2, 0) * l(2, 0) - l(2, 1) * l(2, 1));
+    return l;
+}
+
+Eigen3x3 eigen_of(const Mat& q) {
+    Matrix3 a;
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t j = 0; j < 3; ++j) a[i][j] = q(int(i), int(j));
+    return eigen_symmetric(a);
+}
+
+// Points plus, along each principal axis in which they are too thin for the axis ratio cap, a pair of points that
+// thickens them: a flat set has no minimum-volume ellipsoid of positive volume, and the cap would widen it anyway.
+std::vector<Vec> with_thickness(std::span<const Vec> points, double min_radius) {
+    Vec mean = Vec::Zero();
+    for (const Vec& p : points) mean += p;
+    mean /= static_cast<double>(points.size());
+    Mat covariance = Mat::Zero();
+    for (const Vec& p : points) covariance += (p - mean) * (p - mean).transpose();
+    const Eigen3x3 axes = eigen_of(covariance);
+    double low[3], high[3], widest = min_radius;
+    Vec axis[3];
+    for (size_t a = 0; a < 3; ++a) {
+        axis[a] = Vec(axes.vectors[0][a], axes.vectors[1][a], axes.vectors[2][a]);
+        low[a] = HUGE_VAL, high[a] = -HUGE_VAL;
+        for (const Vec& p : points) {
+            const double height = axis[a].dot(p - mean);
+            low[a] = std::min(low[a], height), high[a] = std::max(high[a], height);
+        }
+        widest = std::max(widest, 0.5 * (high[a] - low[a]));
+    }
+    std::vector<Vec> out(points.begin(), points.end());
+    const double thinnest = std::max(min_radius, widest / kMaxAxisRatio);
+    Vec middle = mean;
+    for (size_t a = 0; a < 3; ++a) middle += 0.5 * (low[a] + high[a]) * axis[a];
+    for (size_t a = 0; a < 3; ++a)
+        if (0.5 * (high[a] - low[a]) < 0.5 * thinnest) {
+            out.push_back(middle + 0.5 * thinnest * axis[a]);
+            out.push_back(middle - 0.5 * thinnest * axis[a]);
+        }
+    return out;
+}
+
+} // namespace
+
+Fit::Fit(const Vec& c, const Mat& lower) : center(c), factor(lower) {
+    inverse = Mat::Zero();
+    inverse(0, 0) = 1 / lower(0, 0);
+    inverse(1, 1) = 1 / lower(1, 1);
+    inverse(2, 2) = 1 / lower(2, 2);
+    inverse(1, 0) = -lower(1, 0) * inverse(0, 0) * inverse(1, 1);
+    inverse(2, 1) = -lower(2, 1) * inverse(1, 1) * inverse(2, 2);
+    inverse(2, 0) = -(lower(2, 0) * inverse(0, 0) + lower(2, 1) * inverse(1, 0)) * inverse(2, 2);
+}
+
+Fit::Fit(const Ellipsoid& e)
+    : Fit(to_vec(e.center), (Mat() << e.l11, 0, 0, e.l21, e.l22, 0, e.l31, e.l32, e.l33).finished()) {}
+
+double Fit::volume() const {
+    return 4.0 / 3.0 * std::numbers::pi * factor(0, 0) * factor(1, 1) * factor(2, 2);
+}
+
+Fit Fit::scaled(double by) const {
+    Fit out = *this;
+    out.factor *= by;
+    out.inverse /= by;
+    return out;
+}
+
+double Fit::reach(std::span<const Vec> points) const {
+    double largest = 0;
+    for (const Vec& p : points) largest = std::max(largest, radial_squared(p));
+    return std::sqrt(largest);
+}
+
+Fit capped(const Vec& center, const Mat& q, double min_radius) {
+    const Eigen3x3 axes = eigen_of(q);
+    double radii[3];
+    for (size_t i = 0; i < 3; ++i) radii[i] = std::sqrt(std::max(axes.values[i], 0.0));
+    const double floor = std::max(min_radius, radii[0] / kMaxAxisRatio);
+    if (radii[2] >= floor) return {center, cholesky(q)};
+    Mat widened = Mat::Zero();
+    for (size_t i = 0; i < 3; ++i) {
+        const Vec axis(axes.vectors[0][i], axes.vectors[1][i], axes.vectors[2][i]);
+        const double radius = std::max(radii[i], floor);
+        widened += radius * radius * axis * axis.transpose();
+    }
+    return {center, cholesky(widened)};
+}
+
+Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double tolerance) {
+    const std::vector<Vec> points = with_thickness(input, min_radius);
+    const size_t n = points.size();
+    constexpr double kDimension = 4; // of the lifted points (x, 1)
+
+    // Normalise, so that the moment matrix is well scaled whatever the unit and the place.
+    Box box;
+    for (const Vec& p : points) box.add(p);
+    const Vec shift = box.center();
+    const double scale = 1 / std::max(0.5 * box.size().maxCoeff(), min_radius);
+    std::vector<Eigen::Vector4d> lifted(n);
+    for (size_t i = 0; i < n; ++i) lifted[i] << (points[i] - shift) * scale, 1;
+
+    // Start from extreme points along a few directions (Kumar and Yildirim 2005): the weights stay sparse.
+    std::vector<double> weight(n, 0);
+    size_t started = 0;
+    for (const Vec& d : sketch_directions().first(8)) {
+        size_t low = 0, high = 0;
+        for (size_t i = 1; i < n; ++i) {
+            if (d.dot(points[i]) < d.dot(points[low])) low = i;
+            if (d.dot(points[i]) > d.dot(points[high])) high = i;
+        }
+        for (const size_t i : {low, high})
+            if (weight[i] == 0) weight[i] = 1, ++started;
+    }
+    Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
+    for (size_t i = 0; i < n; ++i)
+        if (weight[i] > 0) {
+            weight[i] = 1 / static_cast<double>(started);
+            moment += weight[i] * lifted[i] * lifted[i].transpose();
+        }
+    // Thin starts are legal; a trace of the identity keeps the inverse finite and dies out with the steps.
+    Eigen::Matrix4d inverse = (moment + 1e-9 * Eigen::Matrix4d::Identity()).inverse();
+    std::vector<double> kappa(n); // lifted^T inverse lifted: 4 on the boundary of the optimum, less inside
+    for (size_t i = 0; i < n; ++i) kappa[i] = lifted[i].dot(inverse * lifted[i]);
+
+    for (int iteration = 0; iteration < 400; ++iteration) {
+        size_t far = 0, near = n;
+        for (size_t i = 0; i < n; ++i) {
+            if (kappa[i] > kappa[far]) far = i;
+            if (weight[i] > 0 && (near == n || kappa[i] < kappa[near])) near = i;
+        }
+        const double excess = kappa[far] / kDimension - 1, slack = 1 - kappa[near] / kDimension;
+        if (excess <= 2 * tolerance && slack <= 4 * tolerance) break;
+        size_t j;
+        double beta; // weights <- (1 - beta) weights + beta e_j
+        if (excess >= slack) {
+            j = far;
+            beta = (kappa[j] - kDimension) / (kDimension * (kappa[j] - 1));
+        } else {
+            j = near;
+            const double full = weight[j] < 1 ? weight[j] / (1 - weight[j]) : HUGE_VAL; // drops the point
+            const double best = kappa[j] > 1 ? (kDimension - kappa[j]) / (kDimension * (kappa[j] - 1)) : HUGE_VAL;
+            beta = -std::min(full, best);
+        }
+        // Sherman-Morrison for ((1 - beta) M + beta q q^T)^-1.
+        const Eigen::Vector4d v = inverse * lifted[j];
+        const double ratio = beta / (1 - beta), damping = ratio / (1 + ratio * kappa[j]);
+        for (size_t i = 0; i < n; ++i) {
+            const double dot = lifted[i].dot(v);
+            kappa[i] = (kappa[i] - damping * dot * dot) / (1 - beta);
+        }
+        inverse = (inverse - damping * v * v.transpose()) / (1 - beta);
+        for (double& w : weight) w *= 1 - beta;
+        weight[j] += beta;
+        if (weight[j] < 1e-12) weight[j] = 0;
+    }
+
+    Vec mean = Vec::Zero();
+    for (size_t i = 0; i < n; ++i) mean += weight[i] * lifted[i].head<3>();
+    Mat q = Mat::Zero();
+    for (size_t i = 0; i < n; ++i) {
+        const Vec d = lifted[i].head<3>() - mean;
+        q += 3 * weight[i] * d * d.transpose();
+    }
+    const Fit fit = capped(mean / scale + shift, q / (scale * scale), min_radius);
+    return fit.scaled(std::max(fit.reach(points), 1e-3));
+}
+
+std::span<const Vec> sketch_directions() {
+    // A Fibonacci lattice on the sphere (Gonzalez 2010), shuffled by a stride so that any first few are spread out too.
+    static const std::vector<Vec> directions = [] {
+        constexpr int kCount = 48, kStride = 11;
+        std::vector<Vec> out;
+        for (int s = 0; s < kCount; ++s) {
+            const int i = s * kStride % kCount;
+            const double z = 1 - (2 * i + 1.0) / kCount, r = std::sqrt(1 - z * z);
+            const double turn = i * (3 - std::sqrt(5.0)) * std::numbers::pi;
+            out.emplace_back(r * std::cos(turn), r * std::sin(turn), z);
+        }
+        return out;
+    }();
+    return directions;
+}
+
+void Sketch::add(std::span<const Vec> points) {
+    if (points.empty()) return;
+    const auto directions = sketch_directions();
+    if (points_.empty()) {
+        points_.assign(directions.size(), points[0]);
+        heights_.assign(directions.size(), -HUGE_VAL);
+    }
+    for (size_t d = 0; d < directions.size(); ++d)
+        for (const Vec& p : points)
+            if (const double height = directions[d].dot(p); height > heights_[d]) heights_[d] = height, points_[d] = p;
+}
+
+void Sketch::add(const Sketch& other) {
+    if (points_.empty()) {
+        *this = other;
+        return;
+    }
+    for (size_t d = 0; d < other.points_.size(); ++d)
+        if (other.heights_[d] > heights_[d]) heights_[d] = other.heights_[d], points_[d] = other.points_[d];
+}
+
+} // namespace prolate

@@ -1,0 +1,66 @@
+// Enclosing ellipsoids of point sets.
+#pragma once
+
+#include "builder/eigen.hpp"
+
+#include <prolate/types.hpp>
+
+#include <span>
+#include <vector>
+
+namespace prolate {
+
+/// Largest ratio of two semi-axes that the bake makes. Needles and sheets beyond it are covered by several nodes or a
+/// thicker one. Bounding it bounds the rounding error of float separation tests (design: at most 30 - 50).
+inline constexpr double kMaxAxisRatio = 40;
+
+/// The ellipsoid {center + L u : |u| <= 1} while it is being fitted, L lower triangular.
+struct Fit {
+    Vec center = Vec::Zero();
+    Mat factor = Mat::Identity();  ///< L
+    Mat inverse = Mat::Identity(); ///< L^-1
+
+    Fit() = default;
+    Fit(const Vec& c, const Mat& lower);
+    explicit Fit(const Ellipsoid& e);
+
+    double radial_squared(const Vec& p) const { return (inverse.triangularView<Eigen::Lower>() * (p - center)).squaredNorm(); }
+    double volume() const;
+    /// Half extents of the bounding box.
+    Vec half_extents() const { return factor.rowwise().norm(); }
+    /// The same shape, `by` times as large.
+    Fit scaled(double by) const;
+    /// Largest radial coordinate |L^-1 (p - center)| of the points: at most 1 means that they are covered.
+    double reach(std::span<const Vec> points) const;
+};
+
+/// Ellipsoid with the shape matrix `q` (symmetric positive definite), its axis ratio brought down to kMaxAxisRatio and its
+/// radii up to `min_radius` by lengthening short axes.
+Fit capped(const Vec& center, const Mat& q, double min_radius);
+
+/// Minimum-volume ellipsoid around `points` (any number above 0, also coplanar or equal ones), capped, to a relative
+/// error of about `tolerance` in radius. It contains the points up to rounding.
+/// Khachiyan's algorithm with away steps (Todd and Yildirim 2007). O(n) an iteration: give it a core set.
+Fit enclosing_ellipsoid(std::span<const Vec> points, double min_radius, double tolerance = 1e-3);
+
+/// Directions in which a point set is sketched: evenly spread over the sphere.
+std::span<const Vec> sketch_directions();
+
+/// Support sketch: for each sketch direction, the point farthest along it. Sketches of a union are merged by taking the
+/// farther point, so that clusters can be merged without looking at their points again.
+class Sketch {
+public:
+    Sketch() = default;
+    explicit Sketch(std::span<const Vec> points) { add(points); }
+    void add(std::span<const Vec> points);
+    void add(const Sketch& other);
+    bool empty() const { return points_.empty(); }
+    /// The farthest points, one per direction, not made unique.
+    std::span<const Vec> points() const { return points_; }
+
+private:
+    std::vector<Vec> points_;
+    std::vector<double> heights_;
+};
+
+} // namespace prolate

@@ -1,0 +1,329 @@
+// Variational optimisation of the ellipsoids of one node (paper, Algorithm 1, step 7; its reference [16] gives no
+// details).
+//
+// Lloyd's idea, with cover as the constraint. In turn, each ellipsoid is freed from all cells that some other one
+// contains too: only the cells that it *alone* covers bind it. It is then refitted around those, and moved and reshaped
+// by a (1+1) evolution strategy (Rechenberg's 1/5 rule) that is always scaled back until it covers them. What it lowers
+// is the hybrid error (eq. 3), with E_vol taken as the volume that it adds: outside the solid *and* outside the others,
+// because the union is what counts. In the first sweeps, volume inside the solid earns a reward that is annealed to
+// zero, so that an ellipsoid can take over its neighbours' cells. The best state seen is kept.
+//
+// Known limit: local. Ellipsoids that end with nothing of their own are moved to where the error is worst, but there is
+// no other global step.
+#include "builder/random.hpp"
+#include "builder/split.hpp"
+
+#include "src/symmetric3.hpp"
+
+#include <algorithm>
+
+namespace prolate {
+namespace {
+
+constexpr size_t kSurfaceSamples = 128; // per ellipsoid, for E_sur during a search
+constexpr double kFirstReward = 0.35;   // per volume inside the solid, against 1 per volume outside
+
+bool ratio_allowed(const Fit& fit, double min_radius) {
+    // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
+    if (fit.factor.norm() * fit.inverse.norm() <= kMaxAxisRatio && fit.inverse.norm() * min_radius <= 1) return true;
+    const Mat q = fit.factor * fit.factor.transpose();
+    Matrix3 a;
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t j = 0; j < 3; ++j) a[i][j] = q(int(i), int(j));
+    const Eigen3x3 axes = eigen_symmetric(a);
+    return axes.values[2] * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] &&
+           axes.values[2] >= min_radius * min_radius;
+}
+
+// Cells of the voxel grid that some ellipsoid of the set covers, on a window around the node.
+class Coverage {
+public:
+    Coverage(const Voxels& voxels, std::span<const uint32_t> cells) : voxels_(voxels) {
+        std::array<int, 3> high{};
+        low_ = voxels.size();
+        for (const uint32_t cell : cells)
+            for (size_t a = 0; a < 3; ++a) {
+                low_[a] = std::min(low_[a], voxels.coordinates(cell)[a]);
+                high[a] = std::max(high[a], voxels.coordinates(cell)[a] + 1);
+            }
+        for (size_t a = 0; a < 3; ++a) { // ellipsoids stick out of their cells
+            const int margin = (high[a] - low_[a]) / 4 + 2;
+            low_[a] = std::max(low_[a] - margin, 0);
+            size_[a] = std::min(high[a] + margin, voxels.size()[a]) - low_[a];
+        }
+        count_.assign(static_cast<size_t>(size_[0]) * static_cast<size_t>(size_[1]) * static_cast<size_t>(size_[2]), 0);
+    }
+
+    void add(const Fit& fit, int by) {
+        // One row through each voxel center; a voxel counts if its center is covered.
+        for_each_row(
+            fit, voxels_,
+            [&](int i, int j, double z0, double z1, double) {
+                if (i < low_[0] || j < low_[1] || i >= low_[0] + size_[0] || j >= low_[1] + size_[1]) return;
+                uint16_t* const row = count_.data() + row_index(i, j);
+                const int last = std::min(static_cast<int>(std::floor(z1 - 0.5)) - low_[2], size_[2] - 1);
+                for (int k = std::max(static_cast<int>(std::ceil(z0 - 0.5)) - low_[2], 0); k <= last; ++k)
+                    row[k] = static_cast<uint16_t>(row[k] + by);
+            },
+            1);
+    }
+
+    // Volume of `fit` that is outside the solid and that nothing else covers, and its volume inside the solid.
+    struct Volumes {
+        double added, solid;
+    };
+    Volumes added_volume(const Fit& fit) const {
+        double whole = 0, taken = 0, inside = 0;
+        const auto& size = voxels_.size();
+        for_each_row(fit, voxels_, [&](int i, int j, double z0, double z1, double area) {
+            whole += area * (z1 - z0);
+            if (i < 0 || j < 0 || i >= size[0] || j >= size[1]) return;
+            const double solid = area * (voxels_.solid_below(i, j, z1) - voxels_.solid_below(i, j, z0));
+            inside += solid;
+            if (i < low_[0] || j < low_[1] || i >= low_[0] + size_[0] || j >= low_[1] + size_[1]) {
+                taken += solid;
+                return;
+            }
+            // Within the window, voxel by voxel; above and below it, the solid alone counts.
+            const double w0 = std::clamp(z0, double(low_[2]), double(low_[2] + size_[2]));
+            const double w1 = std::clamp(z1, double(low_[2]), double(low_[2] + size_[2]));
+            taken += solid - area * (voxels_.solid_below(i, j, w1) - voxels_.solid_below(i, j, w0));
+            const uint16_t* const row = count_.data() + row_index(i, j);
+            const size_t first = voxels_.index(i, j, 0);
+            const int k1 = std::min(static_cast<int>(w1), low_[2] + size_[2] - 1);
+            for (int k = static_cast<int>(w0); k <= k1; ++k) {
+                const double length = std::min(w1, k + 1.0) - std::max(w0, double(k));
+                taken += area * length * (row[k - low_[2]] ? 1.0 : double{voxels_.solid_fraction(first + static_cast<size_t>(k))});
+            }
+        });
+        const double unit = voxels_.pitch() * voxels_.pitch() * voxels_.pitch();
+        return {std::max(whole - taken, 0.0) * unit, inside * unit};
+    }
+
+private:
+    size_t row_index(int i, int j) const {
+        return (static_cast<size_t>(i - low_[0]) * static_cast<size_t>(size_[1]) + static_cast<size_t>(j - low_[1])) *
+               static_cast<size_t>(size_[2]);
+    }
+
+    const Voxels& voxels_;
+    std::array<int, 3> low_{}, size_{};
+    std::vector<uint16_t> count_;
+};
+
+class Optimiser {
+public:
+    Optimiser(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
+              const SplitOptions& options)
+        : voxels_(voxels), cells_(cells), options_(options), random_(options.seed), coverage_(voxels, cells),
+          holders_(cells.size(), 0) {
+        for (const Cluster& cluster : clusters) {
+            fits_.push_back(cluster.fit);
+            holds_.emplace_back();
+            added_.push_back(0);
+            include(fits_.size() - 1);
+        }
+    }
+
+    void run() {
+        keep_best();
+        for (int sweep = 0; sweep < options_.sweeps; ++sweep) {
+            if (options_.cancelled->load(std::memory_order_relaxed)) return;
+            // Two annealing cycles; the last third of each is pure.
+            const int cycle = (options_.sweeps + 1) / 2, at = sweep % cycle;
+            const double reward = kFirstReward * std::max(0.0, 1 - 1.5 * at / std::max(1, cycle - 1));
+            for (size_t i = 0; i < fits_.size(); ++i) improve(i, reward);
+            if (reward == 0) keep_best();
+        }
+        fits_ = best_;
+    }
+
+    // Each cell to the ellipsoid that holds it most centrally.
+    void assign(std::vector<Cluster>& clusters) {
+        for (size_t i = 0; i < fits_.size(); ++i) {
+            exclude(i); // fits_ may have been exchanged: recompute who holds what
+            include(i);
+        }
+        clusters.assign(fits_.size(), {});
+        for (size_t i = 0; i < fits_.size(); ++i) clusters[i].fit = fits_[i];
+        for (size_t c = 0; c < cells_.size(); ++c) {
+            size_t owner = fits_.size();
+            double nearest = HUGE_VAL;
+            for (size_t i = 0; i < fits_.size(); ++i) {
+                if (!holds_[i][c]) continue;
+                const double radial = fits_[i].radial_squared(voxels_.center(cells_[c]));
+                if (radial < nearest) nearest = radial, owner = i;
+            }
+            clusters[owner].cells.push_back(cells_[c]);
+        }
+        std::erase_if(clusters, [](const Cluster& cluster) { return cluster.cells.empty(); });
+    }
+
+private:
+    bool holds(const Fit& fit, double shortest_inverse, uint32_t cell) const {
+        const double radial = std::sqrt(fit.radial_squared(voxels_.center(cell)));
+        const double spread = voxels_.radius(cell) * shortest_inverse;
+        if (radial + spread <= 1) return true;
+        if (radial - spread > 1) return false;
+        for (const Vec& p : voxels_.points(cell))
+            if (fit.radial_squared(p) > kHeld) return false;
+        return true;
+    }
+
+    void include(size_t i) {
+        const double shortest_inverse = fits_[i].inverse.norm();
+        holds_[i].resize(cells_.size());
+        for (size_t c = 0; c < cells_.size(); ++c) {
+            holds_[i][c] = holds(fits_[i], shortest_inverse, cells_[c]);
+            holders_[c] = static_cast<uint16_t>(holders_[c] + holds_[i][c]);
+        }
+        coverage_.add(fits_[i], +1);
+        included_.resize(fits_.size());
+        included_[i] = fits_[i];
+    }
+    void exclude(size_t i) {
+        for (size_t c = 0; c < cells_.size(); ++c) holders_[c] = static_cast<uint16_t>(holders_[c] - holds_[i][c]);
+        coverage_.add(included_[i], -1);
+    }
+
+    double error_of(const Fit& fit, std::span<const Vec> samples, double reward, double* added = nullptr) const {
+        double surface = 0;
+        for (const Vec& p : samples) surface = std::max(surface, radial_distance(fit, p));
+        const Coverage::Volumes volumes = coverage_.added_volume(fit);
+        if (added) *added = volumes.added;
+        return options_.error(surface, volumes.added) - options_.error.beta * reward * volumes.solid;
+    }
+
+    void improve(size_t i, double reward) {
+        exclude(i);
+        std::vector<uint32_t> alone;
+        for (size_t c = 0; c < cells_.size(); ++c)
+            if (holders_[c] == 0) alone.push_back(cells_[c]);
+        if (alone.empty()) alone = half_of_the_worst(i);
+        if (!alone.empty()) fits_[i] = search(fits_[i], alone, reward, added_[i]);
+        include(i);
+    }
+
+    // Nothing binds this ellipsoid: it goes to help the one that adds most, with half of what that one holds.
+    std::vector<uint32_t> half_of_the_worst(size_t redundant) const {
+        size_t worst = redundant;
+        for (size_t j = 0; j < fits_.size(); ++j)
+            if (j != redundant && (worst == redundant || added_[j] > added_[worst])) worst = j;
+        if (worst == redundant) return {};
+        std::vector<uint32_t> own;
+        Vec mean = Vec::Zero();
+        for (size_t c = 0; c < cells_.size(); ++c)
+            if (holds_[worst][c] && holders_[c] == 1) own.push_back(cells_[c]), mean += voxels_.center(cells_[c]);
+        if (own.size() < 2) return own;
+        mean /= static_cast<double>(own.size());
+        int longest = 0; // column of L with most weight: the factor's last rows mix, so take the widest box side
+        fits_[worst].half_extents().maxCoeff(&longest);
+        std::vector<uint32_t> half;
+        for (const uint32_t cell : own)
+            if (voxels_.center(cell)[longest] <= mean[longest]) half.push_back(cell);
+        return half;
+    }
+
+    Fit search(const Fit& current, std::span<const uint32_t> alone, double reward, double& added) {
+        // What binds: the extreme points of the cells held alone.
+        Sketch sketch;
+        std::vector<Vec> samples;
+        for (const uint32_t cell : alone) {
+            sketch.add(voxels_.points(cell));
+            const auto own = voxels_.samples(cell);
+            samples.insert(samples.end(), own.begin(), own.end());
+        }
+        if (samples.size() > kSurfaceSamples) {
+            const size_t stride = samples.size() / kSurfaceSamples + 1;
+            size_t kept = 0;
+            for (size_t s = 0; s < samples.size(); s += stride) samples[kept++] = samples[s];
+            samples.resize(kept);
+        }
+        std::vector<Vec> core(sketch.points().begin(), sketch.points().end());
+        const auto tightened = [&](const Fit& fit) { return fit.scaled(fit.reach(core) * (1 + 1e-9)); };
+
+        const Fit fresh = fit_cells(voxels_, alone, options_.min_radius);
+        // Where the fresh fit touches, it may touch at points that the sketch does not have.
+        for (const uint32_t cell : alone)
+            for (const Vec& p : voxels_.points(cell))
+                if (fresh.radial_squared(p) > 0.98) core.push_back(p);
+        if (core.size() > 256) { // many cells touch: keep an even choice of the extra ones
+            std::vector<Vec> fewer(core.begin(), core.begin() + 48);
+            for (size_t e = 48; e < core.size(); e += core.size() / 200 + 1) fewer.push_back(core[e]);
+            core.swap(fewer);
+        }
+
+        Fit best = tightened(fresh);
+        double best_error = error_of(best, samples, reward);
+        if (const Fit old = tightened(current); ratio_allowed(old, options_.min_radius)) {
+            const double error = error_of(old, samples, reward);
+            if (error < best_error) best = old, best_error = error;
+        }
+        double step = 0.08;
+        for (int trial = 0; trial < options_.trials && step > 1e-4; ++trial) {
+            Mat change = Mat::Identity();
+            for (int r = 0; r < 3; ++r)
+                for (int c = 0; c <= r; ++c) change(r, c) += step * random_.symmetric();
+            const Vec shift = step * Vec(random_.symmetric(), random_.symmetric(), random_.symmetric());
+            const Fit proposal = tightened({best.center + best.factor * shift, Mat(best.factor * change)});
+            if (!ratio_allowed(proposal, options_.min_radius)) continue;
+            const double error = error_of(proposal, samples, reward);
+            if (error < best_error) {
+                best = proposal, best_error = error;
+                step *= 1.6;
+            } else {
+                step *= 0.9;
+            }
+        }
+        // Cover of all the points, not of the core alone.
+        double reach = 1;
+        for (const uint32_t cell : alone) reach = std::max(reach, best.reach(voxels_.points(cell)));
+        best = best.scaled(reach * (1 + 1e-9));
+        error_of(best, {}, 0, &added);
+        return best;
+    }
+
+    void keep_best() {
+        double error = 0;
+        // Adding them one by one, each against those before it, sums to the union.
+        for (size_t i = 0; i < fits_.size(); ++i) coverage_.add(included_[i], -1);
+        std::vector<std::vector<uint32_t>> own(fits_.size());
+        for (size_t c = 0; c < cells_.size(); ++c)
+            for (size_t i = 0; i < fits_.size(); ++i)
+                if (holds_[i][c]) {
+                    own[i].push_back(cells_[c]);
+                    break;
+                }
+        for (size_t i = 0; i < fits_.size(); ++i) {
+            error += options_.error(surface_error(fits_[i], voxels_, own[i]),
+                                    coverage_.added_volume(fits_[i]).added);
+            coverage_.add(included_[i], +1);
+        }
+        if (best_.empty() || error < best_error_) best_ = fits_, best_error_ = error;
+    }
+
+    static constexpr double kHeld = 1 + 1e-7; // squared radial coordinate up to which a point counts as held
+
+    const Voxels& voxels_;
+    std::span<const uint32_t> cells_;
+    const SplitOptions& options_;
+    Random random_;
+    Coverage coverage_;
+    std::vector<Fit> fits_, included_, best_;
+    double best_error_ = HUGE_VAL;
+    std::vector<double> added_;               // volume that each ellipsoid adds outside
+    std::vector<std::vector<uint8_t>> holds_; // [ellipsoid][cell]
+    std::vector<uint16_t> holders_;           // how many ellipsoids hold each cell: at least one between updates
+};
+
+} // namespace
+
+void optimise(const Voxels& voxels, std::span<const uint32_t> cells, std::vector<Cluster>& clusters,
+              const SplitOptions& options) {
+    if (clusters.size() < 2) return;
+    Optimiser optimiser(voxels, cells, clusters, options);
+    optimiser.run();
+    optimiser.assign(clusters);
+}
+
+} // namespace prolate

@@ -1,0 +1,43 @@
+// Checking and hashing of BuildOptions.
+#include <prolate/build.hpp>
+
+#include "src/bytes.hpp"
+#include "src/hash.hpp"
+
+#include <array>
+#include <cmath>
+
+namespace prolate {
+
+Result<void> validate(const BuildOptions& o) {
+    const auto bad = [](const char* what, uint64_t value) { return Error{ErrorCode::bad_options, what, value}; };
+    if (o.degree < 2 || o.degree > kMaxDegree) return bad("degree must be 2 to 64", o.degree);
+    if ((o.levels > 0) + (o.ellipsoids > 0) + (o.tolerance != 0) > 1)
+        return bad("give only one of levels, ellipsoids and tolerance", 0);
+    if (o.levels >= kMaxLevels) return bad("levels must be 1 to 31", o.levels);
+    if (o.ellipsoids > 65536) return bad("ellipsoids must be 1 to 65536", o.ellipsoids);
+    if (!std::isfinite(o.tolerance) || o.tolerance < 0) return bad("tolerance must be above 0", 0);
+    if (!std::isfinite(o.alpha) || o.alpha < 0) return bad("alpha must be 0 or above", 0);
+    if (!std::isfinite(o.beta) || o.beta < 0) return bad("beta must be 0 or above", 0);
+    if (o.alpha + o.beta <= 0) return bad("alpha and beta must not both be 0", 0);
+    if (o.threads > 1024) return bad("threads must be 0 (all cores) to 1024", o.threads);
+    if (o.method != Method::voxel)
+        return Error{ErrorCode::unsupported, "the analytic method is not in this version; use voxel", 0};
+    if (o.primitive != Primitive::ellipsoid)
+        return Error{ErrorCode::unsupported, "sphere trees are not in this version; use ellipsoid", 0};
+    return {};
+}
+
+uint64_t hash(const BuildOptions& o) {
+    std::array<std::byte, 40> bytes{};
+    std::byte* to = bytes.data();
+    const auto put = [&to](auto value) {
+        store_le(to, value);
+        to += sizeof value;
+    };
+    put(o.degree), put(o.levels), put(o.ellipsoids), put(o.tolerance), put(o.alpha), put(o.beta), put(o.seed);
+    put(static_cast<uint8_t>(o.method)), put(static_cast<uint8_t>(o.primitive)), put(static_cast<uint8_t>(o.quality));
+    return hash_bytes(bytes);
+}
+
+} // namespace prolate

@@ -1,0 +1,45 @@
+// Dividing a sub-volume among k ellipsoids (paper, Algorithm 1, steps 6 and 7).
+#pragma once
+
+#include "builder/outside_volume.hpp"
+
+#include <atomic>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace prolate {
+
+/// A part of the solid, as cells, and an ellipsoid that covers the points of all of them.
+struct Cluster {
+    Fit fit;
+    std::vector<uint32_t> cells;
+};
+
+struct SplitOptions {
+    HybridError error;
+    double min_radius;          ///< metres; keeps flat parts from flat ellipsoids
+    int sweeps;                 ///< of the variational optimisation
+    int trials;                 ///< proposals an ellipsoid and sweep
+    uint64_t seed;
+    const std::atomic<bool>* cancelled; ///< checked between sweeps; then the result is to be thrown away
+};
+
+/// Ellipsoid around the points of `cells`, to a tight tolerance: sketch, fit, and refit with what sticks out.
+Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> cells, double min_radius);
+
+/// Step 6: m >> k connected blocks of cells, merged pairwise by the least growth of the error until k are left.
+/// O(m log m) merges. Fewer than k clusters only if there are fewer cells.
+std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
+                                  const SplitOptions& options);
+
+/// Step 7: lowers the error of `clusters`, which together hold `cells`, by moving and reshaping one ellipsoid at a time.
+/// The clusters still partition `cells` afterwards; those that nothing is left for are dropped.
+void optimise(const Voxels& voxels, std::span<const uint32_t> cells, std::vector<Cluster>& clusters,
+              const SplitOptions& options);
+
+/// Steps 6 and 7: up to k clusters that partition `cells`.
+std::vector<Cluster> split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
+                           const SplitOptions& options);
+
+} // namespace prolate

@@ -1,0 +1,295 @@
+// Proof of cover by adaptive subdivision, from the decoded tree and the mesh alone.
+//
+// For a box B, the polyhedron (solid ∩ B) is the convex combination of its extreme points, and those are corners of the
+// triangles clipped to B, or corners of B inside the solid. If all of them lie in one ellipsoid, so does the whole piece,
+// because an ellipsoid is convex. Otherwise B is cut into eight. The proof ends because the ellipsoids overlap: around
+// each point of the solid there is a box small enough for one of them, unless that point is on the very border of all
+// ellipsoids that contain it.
+//
+// Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners of B are
+// classified by the winding number, evaluated to better than 0.1 where 0 and 1 are the only values, with a threshold of
+// 0.25: in doubt a corner belongs to the solid.
+//
+// Shares no data with the bake: other boxes, other inside test (dipole tree instead of columns).
+#include <prolate/verify.hpp>
+
+#include "builder/clip.hpp"
+#include "builder/fit.hpp"
+#include "builder/winding.hpp"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <optional>
+
+namespace prolate {
+namespace {
+
+constexpr double kTolerance = 1e-12;     // of the largest coordinate: corners must be inside by this much
+constexpr double kSmallestBox = 1e-9;    // of the mesh's size: below, the proof gives up
+constexpr uint64_t kPiecesPerTask = 4'000'000; // a bound on the work at hostile trees; real ones need about 10,000
+constexpr double kAccuracy = 3;          // of the winding number, see Winding
+constexpr int kTaskLevels = 3;           // 8^3 boxes to share between threads
+
+struct Shape {
+    Fit fit;
+    double shrunk;           // squared radial coordinate up to which a point is inside beyond doubt
+    double shortest_inverse; // bounds |L^-1 v| / |v|
+};
+
+struct Cell {
+    Box box;
+    std::vector<Polygon> polygons;   // the surface in the box
+    std::vector<uint32_t> candidates; // ellipsoids that may meet the box
+};
+
+class Prover {
+public:
+    Prover(const std::vector<Shape>& shapes, const Winding* winding, double size, std::atomic<bool>& stop)
+        : shapes_(shapes), winding_(winding), size_(size), stop_(stop) {}
+
+    LevelProof proof; // covered stays true until something speaks against it
+
+    // Done with this cell? If not, it has to be cut.
+    bool settled(Cell& cell) {
+        ++proof.pieces;
+        drop_far_candidates(cell);
+        if (cell.polygons.empty() && !winding_) return true; // surface mode: nothing here to cover
+        for (const uint32_t c : cell.candidates)
+            if (holds_box(shapes_[c], cell.box)) return true;
+        if (cell.polygons.empty()) { // wholly inside the solid or wholly outside
+            if (!inside(cell.box.center())) return true;
+        } else {
+            std::array<int8_t, 8> corner_inside; // -1: not asked yet
+            corner_inside.fill(-1);
+            for (const uint32_t c : cell.candidates)
+                if (holds_piece(shapes_[c], cell, corner_inside)) return true;
+        }
+        refute(cell);
+        return !proof.covered;
+    }
+
+    void prove(Cell& cell, int depth = 0) {
+        if (stop_.load(std::memory_order_relaxed) || settled(cell)) return;
+        if (cell.box.size().maxCoeff() < kSmallestBox * size_ || proof.pieces > kPiecesPerTask) {
+            give_up(cell.box.center());
+            return;
+        }
+        std::array<Cell, 8> parts = cut(cell);
+        cell = {}; // the memory is not needed on the way down
+        for (Cell& part : parts) {
+            prove(part, depth + 1);
+            if (!proof.covered) return;
+        }
+    }
+
+    static std::array<Cell, 8> cut(const Cell& cell) {
+        std::array<Cell, 8> parts;
+        const Vec middle = cell.box.center();
+        for (unsigned p = 0; p < 8; ++p) {
+            for (int a = 0; a < 3; ++a) {
+                const bool upper = p >> a & 1;
+                parts[p].box.low[a] = upper ? middle[a] : cell.box.low[a];
+                parts[p].box.high[a] = upper ? cell.box.high[a] : middle[a];
+            }
+            parts[p].candidates = cell.candidates;
+        }
+        Polygon x[2], y[2], z[2];
+        for (const Polygon& polygon : cell.polygons) {
+            split_polygon(polygon, 0, middle[0], x[0], x[1]);
+            for (unsigned i = 0; i < 2; ++i) {
+                if (x[i].empty()) continue;
+                split_polygon(x[i], 1, middle[1], y[0], y[1]);
+                for (unsigned j = 0; j < 2; ++j) {
+                    if (y[j].empty()) continue;
+                    split_polygon(y[j], 2, middle[2], z[0], z[1]);
+                    for (unsigned k = 0; k < 2; ++k)
+                        if (!z[k].empty()) parts[i | j << 1 | k << 2].polygons.push_back(z[k]);
+                }
+            }
+        }
+        return parts;
+    }
+
+private:
+    bool inside(const Vec& p) const { return std::abs((*winding_)(p, kAccuracy)) > 0.25; }
+
+    static bool holds(const Shape& shape, const Vec& p) { return shape.fit.radial_squared(p) <= shape.shrunk; }
+
+    bool holds_box(const Shape& shape, const Box& box) const {
+        for (unsigned i = 0; i < 8; ++i)
+            if (!holds(shape, box.corner(i))) return false;
+        return true;
+    }
+
+    bool holds_piece(const Shape& shape, const Cell& cell, std::array<int8_t, 8>& corner_inside) const {
+        for (const Polygon& polygon : cell.polygons)
+            for (const Vec& p : polygon)
+                if (!holds(shape, p)) return false;
+        if (!winding_) return true;
+        for (unsigned i = 0; i < 8; ++i) {
+            const Vec corner = cell.box.corner(i);
+            if (holds(shape, corner)) continue;
+            if (corner_inside[i] < 0) corner_inside[i] = inside(corner);
+            if (corner_inside[i]) return false;
+        }
+        return true;
+    }
+
+    void drop_far_candidates(Cell& cell) const {
+        const Vec center = cell.box.center();
+        const double radius = 0.5 * cell.box.size().norm();
+        std::erase_if(cell.candidates, [&](uint32_t c) {
+            const Shape& shape = shapes_[c];
+            if (std::sqrt(shape.fit.radial_squared(center)) <= 1 + radius * shape.shortest_inverse) {
+                const Vec gap = (center - shape.fit.center).cwiseAbs() - 0.5 * cell.box.size();
+                return (gap.array() > shape.fit.half_extents().array() * (1 + 1e-9)).any();
+            }
+            return true;
+        });
+    }
+
+    // Looks for a point of the solid, among those at hand, that no ellipsoid contains, not even barely.
+    void refute(const Cell& cell) {
+        const auto check = [&](const Vec& p, auto&& is_solid) {
+            double nearest = HUGE_VAL;
+            for (const uint32_t c : cell.candidates) {
+                nearest = std::min(nearest, shapes_[c].fit.radial_squared(p));
+                if (nearest <= 1) return;
+            }
+            if (!is_solid()) return;
+            for (const Shape& shape : shapes_) nearest = std::min(nearest, shape.fit.radial_squared(p));
+            if (nearest <= 1) return;
+            proof.covered = false;
+            proof.has_counterexample = true;
+            std::copy_n(p.data(), 3, proof.point);
+            proof.depth = std::sqrt(nearest) - 1;
+        };
+        for (const Polygon& polygon : cell.polygons)
+            for (const Vec& p : polygon) {
+                check(p, [] { return true; });
+                if (!proof.covered) return;
+            }
+        if (!winding_) return;
+        for (unsigned i = 0; i < 9 && proof.covered; ++i) {
+            const Vec p = i < 8 ? cell.box.corner(i) : cell.box.center();
+            // A point that close to 1/2 lies on the surface: as good a witness as any, but 3/4 leaves no doubt.
+            check(p, [&] { return std::abs((*winding_)(p, kAccuracy)) > 0.75; });
+        }
+    }
+
+    void give_up(const Vec& p) {
+        proof.covered = false;
+        std::copy_n(p.data(), 3, proof.point);
+    }
+
+    const std::vector<Shape>& shapes_;
+    const Winding* winding_; // null in surface mode
+    double size_;
+    std::atomic<bool>& stop_;
+};
+
+LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Winding* winding, const Box& box,
+                       const std::function<bool(double)>& progress, std::atomic<bool>& stop) {
+    const double size = box.size().norm();
+    // Cut down to enough boxes for the threads, settling on the way what can be.
+    Cell root;
+    root.box = box;
+    for (const Triangle& t : mesh.triangles)
+        root.polygons.push_back(
+            {to_vec(mesh.vertices[t[0]]), to_vec(mesh.vertices[t[1]]), to_vec(mesh.vertices[t[2]])});
+    for (uint32_t i = 0; i < shapes.size(); ++i) root.candidates.push_back(i);
+
+    Prover coarse(shapes, winding, size, stop);
+    coarse.proof.covered = true;
+    std::vector<Cell> cells;
+    cells.push_back(std::move(root));
+    for (int level = 0; level < kTaskLevels; ++level) {
+        std::vector<Cell> next;
+        for (Cell& cell : cells) {
+            if (coarse.settled(cell)) {
+                if (!coarse.proof.covered) return coarse.proof;
+                continue;
+            }
+            for (Cell& part : Prover::cut(cell)) next.push_back(std::move(part));
+            cell = {};
+        }
+        cells.swap(next);
+    }
+
+    std::vector<LevelProof> proofs(cells.size());
+    std::atomic<size_t> done = 0;
+    std::mutex reporting;
+    tbb::parallel_for(size_t{0}, cells.size(), [&](size_t i) {
+        Prover prover(shapes, winding, size, stop);
+        prover.proof.covered = true;
+        prover.prove(cells[i]);
+        proofs[i] = prover.proof;
+        const size_t finished = ++done;
+        if (progress && finished % 8 == 0) {
+            const std::lock_guard lock(reporting);
+            if (!progress(static_cast<double>(finished) / static_cast<double>(cells.size()))) stop = true;
+        }
+    });
+    LevelProof total = coarse.proof;
+    for (const LevelProof& p : proofs) { // the first failure in a fixed order: the same for any number of threads
+        total.pieces += p.pieces;
+        if (total.covered && !p.covered) {
+            const uint64_t pieces = total.pieces;
+            total = p;
+            total.pieces = pieces;
+        }
+    }
+    return total;
+}
+
+} // namespace
+
+Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options) {
+    auto cleaned = clean(mesh);
+    if (!cleaned) return cleaned.error();
+    const MeshView solid = cleaned->mesh.view();
+
+    VerifyReport report;
+    report.surface_mode = !cleaned->report.closed;
+    Box box;
+    for (const Vec3& v : solid.vertices) box.add(to_vec(v));
+    const double size = box.size().norm();
+    const double rounding = kTolerance * std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff());
+    // Not the mesh's own box: halving that one would cut symmetric models in their planes of symmetry.
+    box.low -= 0.0137 * Vec::Constant(size);
+    box.high += 0.0171 * Vec::Constant(size);
+    std::optional<Winding> winding;
+    if (!report.surface_mode) winding.emplace(solid);
+
+    std::atomic<bool> stop = false;
+    tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
+    report.covered = true;
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        std::vector<Shape> shapes;
+        tree.for_each_in_cut(l, [&](uint32_t node) {
+            Shape shape{Fit(tree.ellipsoid(node)), 0, 0};
+            shape.shortest_inverse = shape.fit.inverse.norm();
+            const double margin = std::max(0.0, 1 - rounding * shape.shortest_inverse);
+            shape.shrunk = margin > 0 ? margin * margin - 1e-14 : -1;
+            shapes.push_back(shape);
+        });
+        const auto progress = [&](double fraction) {
+            return options.progress((l + fraction) / tree.level_count());
+        };
+        std::function<bool(double)> level_progress;
+        if (options.progress) level_progress = progress;
+        LevelProof proof;
+        arena.execute([&] { proof = prove_level(shapes, solid, winding ? &*winding : nullptr, box, level_progress, stop); });
+        if (stop) return Error{ErrorCode::cancelled, "cancelled", 0};
+        report.covered = report.covered && proof.covered;
+        report.levels.push_back(proof);
+    }
+    return report;
+}
+
+} // namespace prolate
