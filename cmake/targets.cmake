@@ -16,6 +16,9 @@ function(prolate_target target)
       -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=address,undefined)
   endif()
+  if(PROLATE_BUILD_FUZZ)
+    target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link) # coverage, which guides the fuzzer
+  endif()
 endfunction()
 
 # prolate_library(NAME SOURCES...): the static library prolate_NAME, alias and export name prolate::NAME.
@@ -28,4 +31,13 @@ function(prolate_library name)
   # Sources name internal headers by folder: "src/symmetric3.hpp". tests/layering.cmake checks who may name whom.
   target_include_directories(prolate_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   prolate_target(prolate_${name})
+endfunction()
+
+# prolate_fuzzer(NAME SOURCES... LIBS targets...): a libFuzzer program; clang only.
+function(prolate_fuzzer name)
+  cmake_parse_arguments(arg "" "" "LIBS" ${ARGN})
+  add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
+  prolate_target(${name})
+  target_link_libraries(${name} PRIVATE ${arg_LIBS})
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
 endfunction()
