@@ -33,7 +33,9 @@ struct MeshReport {
     uint32_t input_triangles = 0;
     uint32_t merged_vertices = 0;      ///< vertices that lay exactly on an earlier one
     uint32_t unused_vertices = 0;      ///< vertices of no kept triangle
-    uint32_t degenerate_triangles = 0; ///< zero area; dropped where their points lie in other triangles, kept otherwise
+    /// Of zero area. Those with a repeated corner are dropped if their points lie in other triangles; the rest stay, so
+    /// that no point of the surface is lost.
+    uint32_t degenerate_triangles = 0;
     uint32_t open_edges = 0;           ///< edges whose triangles do not cancel (boundary, or inconsistently oriented)
     uint32_t non_manifold_edges = 0;   ///< edges of three or more triangles
     bool closed = false;               ///< no open edge: winding numbers are whole, and the mesh bounds a solid
@@ -45,14 +47,19 @@ struct CleanMesh {
     MeshReport report;
 };
 
-/// Merges vertices of equal position, drops degenerate triangles and unused vertices, and classifies the edges.
-/// Fails with bad_mesh for no (non-degenerate) triangles, an index out of range, or a coordinate that is not finite
-/// (`where` = triangle or vertex index). Thread-safe.
+/// Merges vertices of equal position, drops redundant triangles and unused vertices, and classifies the edges. What
+/// stays keeps its order. Fails with bad_mesh for no triangle with an area, an index out of range, or a coordinate that
+/// is not finite (`what` begins with "triangle" or "vertex", and `where` is its index). O(n log n). Thread-safe.
 Result<CleanMesh> clean(MeshView mesh);
 
-/// Reads every mesh of a scene, with its transforms, through Assimp: OBJ, PLY, STL, OFF, glTF/GLB, 3DS, DAE.
-/// Fails with io or bad_file; `detail`, if given, then receives the reader's own words. The mesh is not cleaned yet.
-/// Thread-safe for different files.
+/// XXH3-64 of vertices and triangles in their order. Of a cleaned mesh, it is what BakeInfo::source_hash holds.
+uint64_t hash(MeshView mesh) noexcept;
+
+/// Reads every mesh of a scene, with its transforms, through Assimp: OBJ, PLY, STL, OFF, glTF/GLB, 3DS, DAE (by the
+/// name's extension). Polygons become triangles; points and lines are left out; mirroring transforms turn the winding.
+/// Coordinates stay as the file has them: a stated unit or up axis (DAE, 3DS) is not applied.
+/// Fails with io (`where` is errno) or bad_file; `detail`, if given, then receives particulars, such as the reader's
+/// own words. The mesh is not cleaned yet. Thread-safe.
 Result<Mesh> load_mesh(const char* path, std::string* detail = nullptr);
 
 } // namespace prolate
