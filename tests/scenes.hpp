@@ -143,7 +143,7 @@ inline Ellipsoid fit(std::span<const Point> points) {
         for (size_t i = 0; i < 3; ++i)
             for (size_t j = 0; j < 3; ++j) q[i][j] += (p[i] - mean[i]) * (p[j] - mean[j]);
     for (size_t i = 0; i < 3; ++i) sum += q[i][i];
-    for (size_t i = 0; i < 3; ++i) q[i][i] += 1e-3 * sum + 1e-6; // no flat nodes
+    for (size_t i = 0; i < 3; ++i) q[i][i] += 1e-3 * sum + 1e-4; // no flat nodes
     return from_shape(mean, q);
 }
 
@@ -152,7 +152,8 @@ struct TreeOptions {
     uint32_t levels = 4;         ///< at most, the root included
     uint32_t leaf_points = 8;    ///< fewer are not split
     double stop_probability = 0; ///< a node becomes a leaf early: uneven depths
-    double unit = 1;             ///< length of one cloud unit
+    double unit = 1;             ///< length of one cloud unit, a power of two
+    double shrink = 1;           ///< below 1: nodes do not enclose (to show that the tests notice)
 };
 
 /// A built tree and what its nodes stand for.
@@ -162,13 +163,12 @@ struct Scene {
 };
 
 /// Splits the cloud along the longest box side again and again until there are `degree` parts; every node's decoded
-/// ellipsoid encloses its points with 1e-4 to spare.
+/// ellipsoid encloses its points with 5e-3 to spare.
 inline Scene tree(Random& random, std::vector<Point> points, const TreeOptions& options) {
-    for (Point& p : points)
-        for (double& x : p) x *= options.unit;
     Point low = points[0], high = points[0];
     for (const Point& p : points)
         for (size_t i = 0; i < 3; ++i) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+    for (size_t i = 0; i < 3; ++i) low[i] *= options.unit, high[i] *= options.unit;
     const format::Lattice lattice = format::lattice_for(low.data(), high.data());
 
     struct Part {
@@ -200,17 +200,22 @@ inline Scene tree(Random& random, std::vector<Point> points, const TreeOptions& 
     const auto node_of = [&](const Part& part) {
         const std::span<const Point> mine(points.data() + part.begin, part.end - part.begin);
         const Ellipsoid e = fit(mine);
-        double scale = 1e-3;
+        double scale = 0.1;
         for (const Point& p : mine) scale = std::max(scale, std::sqrt(radial_squared(e, p.data())));
         format::PackedNode node;
-        for (;; scale *= 1.01) { // until the decoded ellipsoid encloses
-            const double center[3] = {e.center.x, e.center.y, e.center.z};
-            const double factor[6] = {scale * e.l11, scale * e.l21, scale * e.l22,
-                                      scale * e.l31, scale * e.l32, scale * e.l33};
+        const auto encloses = [&] { // decoded
+            const Ellipsoid d = format::decode(node, lattice);
+            return std::ranges::all_of(mine, [&](const Point& p) {
+                const double q[3] = {p[0] * options.unit, p[1] * options.unit, p[2] * options.unit};
+                return radial_squared(d, q) < 0.99;
+            });
+        };
+        const double u = options.unit, center[3] = {u * e.center.x, u * e.center.y, u * e.center.z};
+        for (;; scale *= 1.01) {
+            const double k = u * scale * options.shrink;
+            const double factor[6] = {k * e.l11, k * e.l21, k * e.l22, k * e.l31, k * e.l32, k * e.l33};
             format::quantise(node, lattice, center, factor);
-            const Ellipsoid decoded = format::decode(node, lattice);
-            if (std::ranges::all_of(mine, [&](const Point& p) { return radial_squared(decoded, p.data()) < 0.9998; }))
-                return node;
+            if (options.shrink < 1 || encloses()) return node;
         }
     };
 
@@ -238,6 +243,8 @@ inline Scene tree(Random& random, std::vector<Point> points, const TreeOptions& 
     info.levels = options.levels - 1;
     info.resolution = 32;
     Scene out{{}, format::encode(info, options.degree, lattice, levels)};
+    for (Point& p : points)
+        for (double& x : p) x *= options.unit;
     out.points = std::move(points);
     return out;
 }
