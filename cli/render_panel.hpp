@@ -1,0 +1,52 @@
+// One panel of a sheet: a scene, ray traced on white paper with soft light, a soft ground shadow and thin outlines.
+#pragma once
+
+#include "cli/scene.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace prolate::cli {
+
+/// The axis that points up in the picture.
+enum class UpAxis : uint8_t { x, y, z, minus_x, minus_y, minus_z };
+
+/// Where the viewer stands, in degrees. Azimuth 0 looks at the front (for y up, along -z; for z up, along +y) and
+/// grows as the viewer walks to the right; elevation is the height above the horizon, -89 ... 89.
+struct View {
+    double azimuth = 30, elevation = 18;
+    UpAxis up = UpAxis::y;
+};
+
+/// Unit vector of the axis.
+glm::dvec3 up_vector(UpAxis up);
+
+/// A camera outside of the unit ball, looking at its center.
+Camera make_camera(const View& view);
+
+/// What one panel needs beside its scene.
+struct PanelSettings {
+    Camera camera;
+    Window window; ///< slopes at the image's borders
+    glm::dvec3 up{0, 1, 0};
+    bool floor_shadow = true; ///< draw the shadow on a floor that the scene stands on
+    uint32_t width = 0, height = 0;
+    uint32_t grid = 6;     ///< samples a pixel: grid * grid
+    double line_width = 1; ///< outlines, in pixels
+};
+
+/// Pixels, row by row from the top.
+struct PanelImage {
+    uint32_t width = 0, height = 0;
+    std::vector<glm::vec3> colour; ///< linear sRGB, 0 ... 1
+    std::vector<float> coverage;   ///< part of the pixel's samples that hit the scene
+};
+
+/// Renders `scene`, whose shape with id i has the linear colour `colours[i]`. Runs on the threads of the calling
+/// task arena; the result does not depend on their number. `progress` is called with the fraction done, by one thread
+/// at a time; if it returns false, so does this function soon, with an incomplete image.
+bool render_panel(const Scene& scene, const std::vector<glm::dvec3>& colours, const PanelSettings& settings,
+                  const std::function<bool(double)>& progress, PanelImage& image);
+
+} // namespace prolate::cli
