@@ -21,7 +21,7 @@ namespace prolate {
 namespace {
 
 constexpr size_t kSurfaceSamples = 128; // per ellipsoid, for E_sur during a search
-constexpr double kFirstReward = 0.35;   // per volume inside the solid, against 1 per volume outside
+constexpr double kFirstReward = 0.1;   // per volume inside the solid, against 1 per volume outside
 
 bool ratio_allowed(const Fit& fit, double min_radius) {
     // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
