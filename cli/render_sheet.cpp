@@ -44,9 +44,12 @@ Layout choose_layout(uint32_t panels, const SheetOptions& o, const Window& shown
         l.cell_width = o.width / l.columns;
         l.cell_height = o.height / l.rows;
         if (std::min(l.cell_width, l.cell_height) < kSmallestCell) continue;
-        l.text = std::clamp(std::min(l.cell_width / 22, l.cell_height / 14), 8u, 64u);
+        l.text = std::clamp(std::min(l.cell_width / 26, l.cell_height / 22), 8u, 64u);
         l.caption = l.text * 2;
         l.scale = std::min(l.cell_width / (shown.u1 - shown.u0), (l.cell_height - l.caption) / (shown.v1 - shown.v0));
+        // No more height than the picture needs, so that its caption stays near.
+        const auto needed = static_cast<uint32_t>(std::ceil(l.scale * (shown.v1 - shown.v0)));
+        l.cell_height = std::min(l.cell_height, needed + l.caption);
         // An empty cell in the last row is a smaller fault than a small picture.
         const double merit = l.scale * std::sqrt(static_cast<double>(panels) / (l.columns * l.rows));
         if (merit > best_merit) {
