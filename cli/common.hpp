@@ -60,6 +60,12 @@ void note(std::string_view subject, std::string_view text);
 std::optional<Mesh> read_mesh(const std::string& path, int& code);
 std::optional<Tree> read_tree(const std::string& path, int& code);
 
+/// True for "-" and "/dev/stdout".
+bool is_standard_output(const std::string& path);
+
+/// Finds out before the work whether `path` can be written: kDone, or reports the reason and returns the exit code.
+int check_output(const std::string& path);
+
 /// Writes a whole output: atomically to a file, or to standard output if `path` is "-". Reports failure.
 int write_output(const std::string& path, std::span<const std::byte> bytes);
 int write_output(const std::string& path, std::string_view text);

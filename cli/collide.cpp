@@ -1,0 +1,108 @@
+// prolate collide: one query between two trees, for trying out and for scripts.
+#include "cli/common.hpp"
+
+#include <prolate/query.hpp>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <memory>
+
+namespace prolate::cli {
+namespace {
+
+constexpr const char* kFooter = R"(
+The pose is that of B in the frame of A: translation tx,ty,tz, then optionally the rotation as a quaternion
+qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapping" speaks of the covers: the solids
+may still be apart by what the covers stick out. The exit code is 0 whatever the verdict.
+
+Examples:
+  prolate collide horse.etree bunny.etree --pose 0.5,0,0
+  prolate collide horse.etree bunny.etree --pose 0.5,0,0,0,0,0.7071,0.7071 --json)";
+
+struct CollideArguments {
+    std::string tree_a, tree_b, pose = "0,0,0";
+    std::optional<uint32_t> level;
+    std::optional<uint64_t> budget;
+    bool json = false;
+};
+
+// Three or seven finite numbers with commas between them, the last four not all zero.
+std::optional<Pose> parse_pose(std::string_view text) {
+    float numbers[7] = {0, 0, 0, 0, 0, 0, 1};
+    size_t count = 0;
+    for (bool more = true; more;) {
+        if (count == std::size(numbers)) return {};
+        const size_t comma = text.find(',');
+        more = comma != text.npos;
+        std::string_view word = text.substr(0, comma);
+        if (more) text.remove_prefix(comma + 1);
+        while (word.starts_with(' ')) word.remove_prefix(1);
+        while (word.ends_with(' ')) word.remove_suffix(1);
+        if (word.starts_with('+')) word.remove_prefix(1);
+        float& number = numbers[count++];
+        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+        if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(number)) return {};
+    }
+    if (count != 3 && count != 7) return {};
+    if (std::all_of(numbers + 3, numbers + 7, [](float q) { return q == 0; })) return {};
+    return Pose{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5], numbers[6]}};
+}
+
+constexpr const char* kVerdicts[] = {"separated", "overlapping", "undecided"};
+
+int run(const CollideArguments& a) {
+    const auto pose = parse_pose(a.pose);
+    if (!pose)
+        return complain(kUsage, "--pose", "not three or seven finite numbers, the quaternion not zero",
+                        "write tx,ty,tz or tx,ty,tz,qx,qy,qz,qw");
+    int code = kDone;
+    const auto tree_a = read_tree(a.tree_a, code);
+    if (!tree_a) return code;
+    const auto tree_b = read_tree(a.tree_b, code);
+    if (!tree_b) return code;
+    QueryOptions options;
+    options.max_level = a.level.value_or(options.max_level);
+    options.max_pair_tests = a.budget.value_or(options.max_pair_tests);
+    CollideContext context;
+    const CollideResult result = collide(tree_a->view(), Pose{}, tree_b->view(), *pose, context, options);
+    const char* verdict = kVerdicts[static_cast<size_t>(result.verdict)];
+    const bool meet = result.verdict == Verdict::overlapping;
+    if (a.json) {
+        nlohmann::ordered_json out;
+        out["verdict"] = verdict;
+        out["node_a"] = meet ? nlohmann::ordered_json(result.node_a) : nullptr;
+        out["node_b"] = meet ? nlohmann::ordered_json(result.node_b) : nullptr;
+        out["pair_tests"] = result.stats.pair_tests;
+        out["evaluations"] = result.stats.evaluations;
+        out["deepest_level"] = result.stats.deepest_level;
+        print(out.dump(2) + '\n');
+        return kDone;
+    }
+    print(meet ? fmt::format("{}: node {} of A and node {} of B meet\n", verdict, result.node_a, result.node_b)
+               : fmt::format("{}\n", verdict));
+    print(fmt::format("{} pair tests, {} evaluations, deepest level {}\n", grouped(result.stats.pair_tests),
+                      grouped(result.stats.evaluations), result.stats.deepest_level));
+    return kDone;
+}
+
+} // namespace
+
+void add_collide(CLI::App& app, Work& chosen) {
+    auto a = std::make_shared<CollideArguments>();
+    CLI::App* command = app.add_subcommand("collide", "Ask whether two trees meet");
+    command->add_option("a", a->tree_a, "the .etree file of body A")->required();
+    command->add_option("b", a->tree_b, "the .etree file of body B")->required();
+    command->add_option("--pose", a->pose, "of B in the frame of A: tx,ty,tz[,qx,qy,qz,qw]")->capture_default_str();
+    command->add_option("--level", a->level, "look no deeper than this level (default: all)");
+    command->add_option("--budget", a->budget, "stop undecided after so many pair tests (default: never)");
+    command->add_flag("--json", a->json, "print JSON");
+    command->footer(kFooter);
+    command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
+}
+
+} // namespace prolate::cli

@@ -1,0 +1,104 @@
+// prolate verify: proves anew, from the file and the mesh alone, that every level of the tree covers.
+#include "cli/common.hpp"
+
+#include <prolate/verify.hpp>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <memory>
+
+namespace prolate::cli {
+namespace {
+
+constexpr const char* kFooter = R"(
+The proof knows nothing of how the tree was made. Exit code 0: every level covers; 1: some level does not, or it
+could not be proved. An open mesh has no inside; then only its triangles are proved.
+
+Examples:
+  prolate verify horse.etree horse.obj
+  prolate verify horse.etree horse.obj --json)";
+
+struct VerifyArguments {
+    std::string tree, mesh;
+    uint32_t threads = 0;
+    bool json = false;
+};
+
+std::string as_json(const VerifyReport& report, bool same_mesh) {
+    nlohmann::ordered_json out;
+    out["covered"] = report.covered;
+    out["surface_mode"] = report.surface_mode;
+    out["baked_from_this_mesh"] = same_mesh;
+    out["levels"] = nlohmann::ordered_json::array();
+    for (const LevelProof& level : report.levels) {
+        nlohmann::ordered_json one;
+        one["covered"] = level.covered;
+        one["pieces"] = level.pieces;
+        if (level.has_counterexample) {
+            one["counterexample"] = level.point;
+            one["depth"] = level.depth;
+        } else if (!level.covered) {
+            one["undecided_at"] = level.point;
+        }
+        out["levels"].push_back(one);
+    }
+    return out.dump(2) + '\n';
+}
+
+std::string as_text(const VerifyReport& report) {
+    std::string out;
+    for (size_t l = 0; l < report.levels.size(); ++l) {
+        const LevelProof& level = report.levels[l];
+        const std::string point =
+            fmt::format("({:.9g}, {:.9g}, {:.9g})", level.point[0], level.point[1], level.point[2]);
+        if (level.covered)
+            out += fmt::format("level {}: covered, proved with {} pieces\n", l, grouped(level.pieces));
+        else if (level.has_counterexample)
+            out += fmt::format("level {}: NOT covered: {} lies in no ellipsoid, by {:.3g} of a radius\n", l, point,
+                               level.depth);
+        else
+            out += fmt::format("level {}: not proved: undecided at {}\n", l, point);
+    }
+    if (report.surface_mode) out += "surface mode: the mesh is open, so its triangles were proved and no inside\n";
+    out += report.covered ? "covered\n" : "NOT covered\n";
+    return out;
+}
+
+int run(const VerifyArguments& a) {
+    int code = kDone;
+    const auto tree = read_tree(a.tree, code);
+    if (!tree) return code;
+    const auto mesh = read_mesh(a.mesh, code);
+    if (!mesh) return code;
+    const auto cleaned = clean(mesh->view());
+    if (!cleaned) return complain(a.mesh, cleaned.error());
+    const bool same_mesh = hash(cleaned->mesh.view()) == tree->view().bake_info().source_hash;
+    if (!same_mesh) note(a.tree, "this tree was baked from another mesh");
+    const auto report = [&] {
+        ProgressLine line;
+        VerifyOptions options;
+        options.threads = a.threads;
+        options.progress = [&line](double fraction) { return line.show("prove", fraction); };
+        return verify(tree->view(), cleaned->mesh.view(), options);
+    }();
+    if (!report) return complain(a.mesh, report.error());
+    print(a.json ? as_json(*report, same_mesh) : as_text(*report));
+    return report->covered ? kDone : kNo;
+}
+
+} // namespace
+
+void add_verify(CLI::App& app, Work& chosen) {
+    auto a = std::make_shared<VerifyArguments>();
+    CLI::App* command = app.add_subcommand("verify", "Prove that every level of a tree covers a mesh");
+    command->add_option("tree", a->tree, "the .etree file")->required();
+    command->add_option("mesh", a->mesh, "the mesh that it should cover")->required();
+    command->add_option("--threads", a->threads, "0 = all cores")->capture_default_str();
+    command->add_flag("--json", a->json, "print JSON");
+    command->footer(kFooter);
+    command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
+}
+
+} // namespace prolate::cli
