@@ -3,6 +3,7 @@
 
 #include "src/symmetric3.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -17,7 +18,15 @@ PrincipalAxes principal_axes(const Ellipsoid& e) noexcept {
     const Eigen3x3 eigen = eigen_symmetric(q);
     PrincipalAxes out{};
     for (size_t i = 0; i < 3; ++i) {
-        out.radii[i] = std::sqrt(eigen.values[i]);
+        // |L^T v|, not the square root of the eigenvalue: Q has lost half of a thin axis' digits, and its eigenvalue
+        // may even come out negative.
+        double square = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            const double component =
+                l[0][k] * eigen.vectors[0][i] + l[1][k] * eigen.vectors[1][i] + l[2][k] * eigen.vectors[2][i];
+            square += component * component;
+        }
+        out.radii[i] = i == 0 ? std::sqrt(square) : std::min(std::sqrt(square), out.radii[i - 1]);
         for (size_t j = 0; j < 3; ++j) out.rotation[i][j] = eigen.vectors[i][j];
     }
     return out;

@@ -178,7 +178,9 @@ Lattice lattice_for(const double low[3], const double high[3]) noexcept {
     if (needed > 0) exponent = std::clamp(std::ilogb(needed) + 1, kMinStepExponent, kMaxStepExponent);
     Lattice lattice;
     lattice.step_exponent = exponent;
-    for (int i = 0; i < 3; ++i) lattice.origin[i] = static_cast<int32_t>(std::floor(std::ldexp(low[i], -exponent)));
+    for (int i = 0; i < 3; ++i) // the clamp acts only beyond the coarsest step, where nothing fits anyway
+        lattice.origin[i] = static_cast<int32_t>(std::clamp(std::floor(std::ldexp(low[i], -exponent)),
+                                                            1.0 - kMaxCoordinate, kMaxCoordinate - UINT16_MAX - 1.0));
     return lattice;
 }
 

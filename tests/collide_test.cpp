@@ -371,6 +371,27 @@ TEST(Collide, CountsItsWork) {
     EXPECT_EQ(near.stats.deepest_level, 3u);
 }
 
+TEST(Collide, ChangedBytesThatOpenStillAnswer) {
+    Random random(47);
+    Scene scene = make(random, {.degree = 3, .levels = 3}, 60);
+    const Scene other = make(random, {.degree = 3, .levels = 3}, 60);
+    uint32_t answered = 0;
+    CollideContext context;
+    for (size_t at = 0; at < scene.bytes.size(); ++at)
+        for (const unsigned flip : {1u, 0x10u, 0x80u, 0xffu}) {
+            scene.bytes[at] ^= std::byte(flip);
+            if (const auto tree = TreeView::open(scene.bytes, {.check_hash = false})) {
+                const Query q = poses(random, 1);
+                const CollideResult result = collide(*tree, q.a, view(other), q.b, context);
+                ASSERT_NE(result.verdict, Verdict::undecided);
+                ASSERT_LT(result.node_a, tree->node_count());
+                ++answered;
+            }
+            scene.bytes[at] ^= std::byte(flip);
+        }
+    EXPECT_GT(answered, 500u);
+}
+
 TEST(Collide, ABadPoseNeverSeparates) {
     Random random(43);
     const Scene a = make(random), b = make(random);

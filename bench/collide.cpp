@@ -1,0 +1,138 @@
+// Speed of the pair test and of tree against tree, on seeded scenes.
+//
+// Counters: evaluations or pair_tests a query (work, the same on every machine) and `verdicts`, a hash of the verdicts
+// of all scenes: if it changes, the answers changed. Scenes are visited in turn, so that the branch predictor cannot
+// learn one pose; 4096 pairs are 1 MB, 256 tree poses one pair of trees.
+//
+//   bench_collide --benchmark_repetitions=5 --benchmark_report_aggregates_only
+#include "query/separation.hpp"
+#include "tests/reference.hpp"
+#include "tests/scenes.hpp"
+
+#include <prolate/query.hpp>
+
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+namespace prolate {
+namespace {
+
+using scenes::Point;
+using scenes::Random;
+
+// 52 bits, so that a double prints it exactly.
+class Hash {
+public:
+    void add(uint64_t x) { state_ = (state_ ^ x) * 0x100000001b3u; }
+    double value() const { return static_cast<double>(state_ >> 12); }
+
+private:
+    uint64_t state_ = 0xcbf29ce484222325u;
+};
+
+struct Pair {
+    Ellipsoid a, b;
+    Pose pose_a, pose_b;
+};
+
+// Pairs whose contact function lies within `spread` of touching.
+std::vector<Pair> pairs(double ratio, double spread) {
+    Random random(1);
+    std::vector<Pair> out(4096);
+    for (Pair& p : out) {
+        p.a = scenes::ellipsoid({}, scenes::radii(random, ratio), random.rotation());
+        p.b = scenes::ellipsoid({}, scenes::radii(random, ratio), random.rotation());
+        const Point d = random.direction();
+        p.pose_a.rotation = random.rotation(), p.pose_b.rotation = random.rotation();
+        p.pose_b.translation = scenes::to_float(d);
+        const auto now = static_cast<double>(reference::contact({p.a, p.pose_a, p.b, p.pose_b}));
+        const double t = random.in(1 - spread, 1 + spread) / now;
+        p.pose_b.translation = scenes::to_float({t * d[0], t * d[1], t * d[2]});
+    }
+    return out;
+}
+
+void pair_test(benchmark::State& state, double ratio, double spread) {
+    const auto scenes = pairs(ratio, spread);
+    std::vector<query::PlacedEllipsoid> a, b;
+    Hash hash;
+    uint64_t evaluations = 0;
+    for (const Pair& p : scenes) {
+        a.push_back(query::place(p.a));
+        b.push_back(query::place(p.b, query::relative_pose(p.pose_a, p.pose_b)));
+        const auto result = query::test_pair(a.back(), b.back());
+        hash.add(static_cast<uint64_t>(result.verdict)), evaluations += result.evaluations;
+    }
+    size_t i = 0;
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(query::test_pair(a[i], b[i]));
+        i = (i + 1) % a.size();
+    }
+    state.counters["evaluations"] = static_cast<double>(evaluations) / static_cast<double>(a.size());
+    state.counters["verdicts"] = hash.value();
+}
+BENCHMARK_CAPTURE(pair_test, random_ratio_5, 5.0, 0.9);
+BENCHMARK_CAPTURE(pair_test, random_ratio_100, 100.0, 0.9);
+BENCHMARK_CAPTURE(pair_test, near_contact_ratio_10, 10.0, 1e-3);
+BENCHMARK_CAPTURE(pair_test, near_contact_ratio_100, 100.0, 1e-3);
+
+// The whole public call, poses included.
+void pair_call(benchmark::State& state) {
+    const auto scenes = pairs(10, 0.9);
+    size_t i = 0;
+    for (auto _ : state) {
+        const Pair& p = scenes[i];
+        benchmark::DoNotOptimize(collide(p.a, p.pose_a, p.b, p.pose_b));
+        i = (i + 1) % scenes.size();
+    }
+}
+BENCHMARK(pair_call);
+
+// Trees of `levels` levels, degree 8. The distance is that at which the covers of the deepest level just meet or just
+// miss, found by bisection for each pair of rotations, plus `offset` of a body's size.
+void tree_tree(benchmark::State& state, uint32_t levels, double offset) {
+    Random random(2);
+    const auto make = [&] {
+        return scenes::tree(random, scenes::cloud(random, 8192), {.levels = levels, .leaf_points = 2});
+    };
+    const auto scene_a = make(), scene_b = make();
+    const TreeView a = *TreeView::open(scene_a.bytes), b = *TreeView::open(scene_b.bytes);
+    CollideContext context;
+    std::vector<std::pair<Pose, Pose>> poses(256);
+    Hash hash;
+    uint64_t pair_tests = 0, evaluations = 0;
+    for (auto& [pose_a, pose_b] : poses) {
+        pose_a.rotation = random.rotation(), pose_b.rotation = random.rotation();
+        const Point d = random.direction();
+        const auto at = [&](double t) {
+            pose_b.translation = scenes::to_float({t * d[0], t * d[1], t * d[2]});
+            return collide(a, pose_a, b, pose_b, context);
+        };
+        double low = 0, high = 8;
+        for (int i = 0; i < 24; ++i) {
+            const double middle = (low + high) / 2;
+            (at(middle).verdict == Verdict::separated ? high : low) = middle;
+        }
+        const CollideResult result = at(high + offset);
+        hash.add(static_cast<uint64_t>(result.verdict));
+        pair_tests += result.stats.pair_tests, evaluations += result.stats.evaluations;
+    }
+    size_t i = 0;
+    for (auto _ : state) {
+        const auto& [pose_a, pose_b] = poses[i];
+        benchmark::DoNotOptimize(collide(a, pose_a, b, pose_b, context));
+        i = (i + 1) % poses.size();
+    }
+    state.counters["pair_tests"] = static_cast<double>(pair_tests) / static_cast<double>(poses.size());
+    state.counters["evaluations"] = static_cast<double>(evaluations) / static_cast<double>(poses.size());
+    state.counters["verdicts"] = hash.value();
+}
+BENCHMARK_CAPTURE(tree_tree, 2_levels_near, 2u, 0.01);
+BENCHMARK_CAPTURE(tree_tree, 3_levels_near, 3u, 0.01);
+BENCHMARK_CAPTURE(tree_tree, 4_levels_near, 4u, 0.01);
+BENCHMARK_CAPTURE(tree_tree, 4_levels_touching, 4u, -0.01);
+BENCHMARK_CAPTURE(tree_tree, 4_levels_far, 4u, 5.0);
+
+} // namespace
+} // namespace prolate

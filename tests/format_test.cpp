@@ -1,0 +1,514 @@
+// The .etree format: golden bytes, every truncation, every single-byte change, decoding and quantising, files.
+//
+// The expected numbers are the format's (src/FORMAT.md). If one of these tests fails because the layout changed, the
+// format version must change too, and the old golden file stays.
+#include "src/format.hpp"
+#include "tests/scenes.hpp"
+
+#include <prolate/tree.hpp>
+#include <prolate/types.hpp>
+#include <prolate/version.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+namespace prolate {
+namespace {
+
+namespace fs = std::filesystem;
+using format::Lattice;
+using format::PackedLevel;
+using format::PackedNode;
+using scenes::Random;
+using Bytes = std::vector<std::byte>;
+
+constexpr OpenOptions kNoHash{.check_hash = false};
+constexpr size_t kTable = 128, kRow = 32, kNodes = kTable + 3 * kRow; // of the golden tree
+constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
+
+std::vector<PackedLevel> golden_levels() {
+    std::vector<PackedLevel> levels(3);
+    levels[0] = {{{.center = {10, 20, 30},
+                   .diagonal = {40000, 50000, 60000},
+                   .off_diagonal = {-1000, 2000, -3000},
+                   .exponent = 1,
+                   .child_count = 2}},
+                 2.5f,
+                 0.75f};
+    levels[1] = {{{.center = {0, 0, 0},
+                   .diagonal = {1, 2, 65535},
+                   .off_diagonal = {32767, -32768, 0},
+                   .exponent = 0,
+                   .child_count = 3},
+                  {.center = {65535, 1, 2}, .diagonal = {300, 200, 100}, .exponent = -7}},
+                 1.25f,
+                 0.5f};
+    levels[2] = {{{.center = {1, 2, 3}, .diagonal = {33000, 34000, 35000}, .exponent = -3},
+                  {.center = {4, 5, 6}, .diagonal = {36000, 37000, 38000}, .exponent = -4},
+                  {.center = {7, 8, 9}, .diagonal = {39000, 40000, 41000}, .exponent = -5}},
+                 std::numeric_limits<float>::quiet_NaN(),
+                 0.25f};
+    return levels;
+}
+BakeInfo golden_info() {
+    return {.source_hash = 0x0123456789abcdefu,
+            .options_hash = 0xfedcba9876543210u,
+            .surface_mode = true,
+            .solid_volume = 12.5,
+            .method = Method::analytic,
+            .primitive = Primitive::ellipsoid,
+            .quality = Quality::best,
+            .alpha = 0.25f,
+            .beta = 0.75f,
+            .tolerance = 0.125f,
+            .levels = 2,
+            .ellipsoids = 9,
+            .seed = 42,
+            .resolution = 96};
+}
+Bytes golden() {
+    return format::encode(golden_info(), 3, kGoldenLattice, golden_levels());
+}
+
+Bytes read(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    const std::string text((std::istreambuf_iterator<char>(in)), {});
+    const auto* const data = reinterpret_cast<const std::byte*>(text.data());
+    return {data, data + text.size()};
+}
+
+// A copy in an allocation of exactly its size, so that a read beyond the end is seen by AddressSanitizer.
+struct Exact {
+    explicit Exact(std::span<const std::byte> from) : size(from.size()), data(new std::byte[from.size()]) {
+        if (size) std::memcpy(data.get(), from.data(), size);
+    }
+    std::span<const std::byte> bytes() const { return {data.get(), size}; }
+    size_t size;
+    std::unique_ptr<std::byte[]> data;
+};
+
+void expect_finite(const Ellipsoid& e) {
+    for (const float x : {e.center.x, e.center.y, e.center.z, e.l11, e.l21, e.l22, e.l31, e.l32, e.l33})
+        ASSERT_TRUE(std::isfinite(x));
+    ASSERT_TRUE(e.l11 > 0 && e.l22 > 0 && e.l33 > 0);
+    ASSERT_TRUE(std::isfinite(volume(e)) && volume(e) > 0);
+    const PrincipalAxes axes = principal_axes(e);
+    for (const double r : axes.radii) ASSERT_TRUE(std::isfinite(r));
+}
+
+// Everything an accessor can answer about an opened tree is in range.
+void expect_sound(const TreeView& tree) {
+    ASSERT_GE(tree.level_count(), 1u);
+    ASSERT_LE(tree.level_count(), kMaxLevels);
+    uint32_t nodes = 0;
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        const LevelInfo level = tree.level(l);
+        ASSERT_EQ(level.first_node, nodes);
+        nodes += level.node_count;
+        ASSERT_TRUE(std::isnan(level.outside_ratio) ||
+                    (std::isfinite(level.outside_ratio) && level.outside_ratio >= 0));
+        ASSERT_TRUE(std::isnan(level.surface_error) ||
+                    (std::isfinite(level.surface_error) && level.surface_error >= 0));
+        ASSERT_EQ(level.end_byte <= tree.bytes().size(), true);
+    }
+    ASSERT_EQ(nodes, tree.node_count());
+    uint32_t next = 1;
+    for (uint32_t n = 0; n < nodes; ++n) {
+        expect_finite(tree.ellipsoid(n));
+        const ChildRange children = tree.children(n);
+        ASSERT_LE(children.count, tree.degree());
+        if (children.count == 0) continue;
+        ASSERT_EQ(children.first, next);
+        next += children.count;
+    }
+    ASSERT_EQ(next, nodes);
+    const BakeInfo info = tree.bake_info();
+    ASSERT_TRUE(std::isfinite(info.alpha) && std::isfinite(info.beta) && std::isfinite(info.tolerance));
+    ASSERT_TRUE(info.method <= Method::analytic && info.primitive <= Primitive::sphere &&
+                info.quality <= Quality::best);
+}
+
+TEST(Format, GoldenFileOfVersionOne) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v1.etree");
+    ASSERT_EQ(file.size(), kNodes + 6 * kNodeBytes);
+    EXPECT_EQ(golden(), file);
+    const auto tree = TreeView::open(file);
+    ASSERT_TRUE(tree) << tree.error().what;
+    expect_sound(*tree);
+    EXPECT_EQ(tree->node_count(), 6u);
+    EXPECT_EQ(tree->level_count(), 3u);
+    EXPECT_EQ(tree->degree(), 3u);
+    EXPECT_FALSE(tree->is_prefix());
+    // By hand: (origin + q) / 16, d 2^(e - 16), o 2^(e - 15).
+    EXPECT_EQ(tree->ellipsoid(0), (Ellipsoid{{-20 / 16.f, 27 / 16.f, 1030 / 16.f},
+                                             40000 / 32768.f,
+                                             -1000 / 16384.f,
+                                             50000 / 32768.f,
+                                             2000 / 16384.f,
+                                             -3000 / 16384.f,
+                                             60000 / 32768.f}));
+    EXPECT_EQ(tree->ellipsoid(1), (Ellipsoid{{-30 / 16.f, 7 / 16.f, 1000 / 16.f},
+                                             1 / 65536.f,
+                                             32767 / 32768.f,
+                                             2 / 65536.f,
+                                             -1.f,
+                                             0.f,
+                                             65535 / 65536.f}));
+    EXPECT_EQ(tree->children(0).first, 1u);
+    EXPECT_EQ(tree->children(1).first, 3u);
+    EXPECT_EQ(tree->children(1).count, 3u);
+    EXPECT_TRUE(tree->is_leaf(2));
+    EXPECT_EQ(tree->level(1).end_byte, kNodes + 3 * kNodeBytes);
+    EXPECT_EQ(tree->level(1).outside_ratio, 1.25f);
+    EXPECT_TRUE(std::isnan(tree->level(2).outside_ratio));
+    const BakeInfo info = tree->bake_info(), expected = golden_info();
+    EXPECT_EQ(info.source_hash, expected.source_hash);
+    EXPECT_EQ(info.options_hash, expected.options_hash);
+    EXPECT_EQ(info.surface_mode, expected.surface_mode);
+    EXPECT_EQ(info.solid_volume, expected.solid_volume);
+    EXPECT_EQ(info.method, expected.method);
+    EXPECT_EQ(info.quality, expected.quality);
+    EXPECT_EQ(info.alpha, expected.alpha);
+    EXPECT_EQ(info.beta, expected.beta);
+    EXPECT_EQ(info.tolerance, expected.tolerance);
+    EXPECT_EQ(info.levels, expected.levels);
+    EXPECT_EQ(info.ellipsoids, expected.ellipsoids);
+    EXPECT_EQ(info.seed, expected.seed);
+    EXPECT_EQ(info.resolution, expected.resolution);
+}
+
+TEST(Format, CutsTakeLeavesFromAbove) {
+    const Bytes bytes = golden();
+    const TreeView tree = *TreeView::open(bytes);
+    const auto cut = [&](uint32_t l) {
+        std::vector<uint32_t> nodes;
+        tree.for_each_in_cut(l, [&](uint32_t n) { nodes.push_back(n); });
+        return nodes;
+    };
+    EXPECT_EQ(cut(0), (std::vector<uint32_t>{0}));
+    EXPECT_EQ(cut(1), (std::vector<uint32_t>{1, 2}));
+    EXPECT_EQ(cut(2), (std::vector<uint32_t>{2, 3, 4, 5}));
+}
+
+TEST(Format, EveryPrefixIsRefusedUnlessALevelEndsThere) {
+    const Bytes bytes = golden();
+    for (const OpenOptions& options : {OpenOptions{}, kNoHash})
+        for (size_t n = 0; n < bytes.size(); ++n) {
+            const Exact part({bytes.data(), n});
+            const auto tree = TreeView::open(part.bytes(), options);
+            const uint32_t levels = n == kNodes + kNodeBytes ? 1 : n == kNodes + 3 * kNodeBytes ? 2 : 0;
+            ASSERT_EQ(tree.has_value(), levels > 0) << n;
+            if (!tree) {
+                ASSERT_EQ(tree.error().code, ErrorCode::bad_file) << n;
+                continue;
+            }
+            EXPECT_EQ(tree->level_count(), levels);
+            EXPECT_TRUE(tree->is_prefix());
+            expect_sound(*tree);
+        }
+    Bytes longer = bytes;
+    longer.push_back(std::byte{0});
+    EXPECT_FALSE(TreeView::open(longer));
+    EXPECT_FALSE(TreeView::open(longer, kNoHash));
+    EXPECT_FALSE(TreeView::open({}));
+}
+
+TEST(Format, EverySingleByteChangeIsFound) {
+    Bytes bytes = golden();
+    for (size_t at = 0; at < bytes.size(); ++at)
+        for (unsigned flip = 1; flip < 256; ++flip) {
+            bytes[at] ^= std::byte(flip);
+            ASSERT_FALSE(TreeView::open(bytes)) << "byte " << at << " xor " << flip;
+            bytes[at] ^= std::byte(flip);
+        }
+    EXPECT_TRUE(TreeView::open(bytes));
+}
+
+TEST(Format, WithoutHashesEveryChangeIsRefusedOrSound) {
+    const Bytes bytes = golden();
+    const Exact copy(bytes);
+    uint32_t accepted = 0, refused = 0;
+    for (size_t at = 0; at < bytes.size(); ++at)
+        for (unsigned flip = 1; flip < 256; ++flip) {
+            copy.data[at] ^= std::byte(flip);
+            const auto tree = TreeView::open(copy.bytes(), kNoHash);
+            if (tree) expect_sound(*tree);
+            if (HasFatalFailure()) FAIL() << "byte " << at << " xor " << flip;
+            ++(tree ? accepted : refused);
+            copy.data[at] ^= std::byte(flip);
+        }
+    EXPECT_GT(accepted, 10'000u);
+    EXPECT_GT(refused, 10'000u);
+}
+
+TEST(Format, NamesTheFirstOffence) {
+    struct Case {
+        size_t at;
+        std::vector<int> bytes;
+        ErrorCode code;
+        uint64_t where;
+    };
+    const size_t node1 = kNodes + kNodeBytes;
+    const Case cases[] = {
+        {0, {'E'}, ErrorCode::bad_file, 0},
+        {8, {2}, ErrorCode::newer_version, 2},
+        {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
+        {8, {0}, ErrorCode::bad_file, 8},
+        {10, {129}, ErrorCode::bad_file, 10},
+        {12, {3}, ErrorCode::bad_file, 12},  // unknown flag
+        {16, {0}, ErrorCode::bad_file, 16},  // total size
+        {48, {7}, ErrorCode::bad_file, 48},  // node count
+        {52, {0}, ErrorCode::bad_file, 52},  // no level
+        {52, {33}, ErrorCode::bad_file, 52}, // too many levels
+        {54, {1}, ErrorCode::bad_file, 54},  // degree
+        {54, {65}, ErrorCode::bad_file, 54},
+        {56, {0, 0, 0, 1}, ErrorCode::bad_file, 56},                   // origin 2^24
+        {68, {61}, ErrorCode::bad_file, 68},                           // step
+        {70, {1}, ErrorCode::bad_file, 70},                            // reserved
+        {72, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 72}, // infinite volume
+        {80, {2}, ErrorCode::bad_file, 80},
+        {81, {2}, ErrorCode::bad_file, 81},
+        {82, {3}, ErrorCode::bad_file, 82},
+        {83, {1}, ErrorCode::bad_file, 83},
+        {84, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 84}, // alpha not a number
+        {88, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 88}, // beta negative
+        {116, {1}, ErrorCode::bad_file, 116},
+        {127, {1}, ErrorCode::bad_file, 116},
+        {kTable, {1}, ErrorCode::bad_file, kTable},                       // first node of level 0
+        {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
+        {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
+        {kTable + 8, {0}, ErrorCode::bad_file, kTable + 8},
+        {kTable + 27, {0xff}, ErrorCode::bad_file, kTable + 24}, // negative figure
+        {kNodes, {2}, ErrorCode::bad_file, kNodes},              // first child
+        {node1 + 23, {4}, ErrorCode::bad_file, node1 + 23},      // more children than the degree
+        {node1 + 23, {2}, ErrorCode::bad_file, node1},           // children that are not the next level
+        {node1 + 22, {101}, ErrorCode::bad_file, node1 + 22},    // exponent
+        {node1 + 10, {0, 0}, ErrorCode::bad_file, node1 + 10},   // no extent
+    };
+    for (const Case& c : cases) {
+        Bytes bytes = golden();
+        for (size_t i = 0; i < c.bytes.size(); ++i) bytes[c.at + i] = std::byte(c.bytes[i]);
+        const auto tree = TreeView::open(bytes, kNoHash);
+        ASSERT_FALSE(tree) << "byte " << c.at;
+        EXPECT_EQ(tree.error().code, c.code) << "byte " << c.at << ": " << tree.error().what;
+        EXPECT_EQ(tree.error().where, c.where) << "byte " << c.at << ": " << tree.error().what;
+    }
+}
+
+TEST(Format, DecodingIsExact) {
+    Random random(1);
+    const auto bits16 = [&] { return static_cast<uint16_t>(random.next()); };
+    for (int i = 0; i < 100'000; ++i) {
+        Lattice lattice;
+        for (int32_t& o : lattice.origin)
+            o = static_cast<int32_t>(random.below(2 * format::kMaxCoordinate - 65536)) - format::kMaxCoordinate + 1;
+        lattice.step_exponent = static_cast<int32_t>(random.below(181)) - 120;
+        PackedNode node;
+        node.exponent = static_cast<int8_t>(static_cast<int>(random.below(201)) - 100);
+        for (size_t k = 0; k < 3; ++k) {
+            node.center[k] = bits16();
+            node.diagonal[k] = std::max<uint16_t>(1, bits16());
+            node.off_diagonal[k] = static_cast<int16_t>(bits16());
+        }
+        const Ellipsoid e = format::decode(node, lattice);
+        const float center[3] = {e.center.x, e.center.y, e.center.z}, diagonal[3] = {e.l11, e.l22, e.l33},
+                    off[3] = {e.l21, e.l31, e.l32};
+        for (size_t k = 0; k < 3; ++k) {
+            ASSERT_EQ(center[k], std::ldexp(1.0 * lattice.origin[k] + node.center[k], lattice.step_exponent));
+            ASSERT_EQ(diagonal[k], std::ldexp(1.0 * node.diagonal[k], node.exponent - 16));
+            ASSERT_EQ(off[k], std::ldexp(1.0 * node.off_diagonal[k], node.exponent - 15));
+        }
+    }
+}
+
+TEST(Format, QuantisingTakesTheNearest) {
+    Random random(2);
+    for (int i = 0; i < 100'000; ++i) {
+        const double size = random.log_in(1e-30, 1e15);
+        const double away = random.below(2) ? size * random.log_in(1, 1e6) : 0;
+        double low[3], high[3], center[3];
+        for (size_t k = 0; k < 3; ++k) {
+            low[k] = away * random.in(-1, 1) - size * random.unit();
+            high[k] = low[k] + size * random.unit();
+            center[k] = random.below(8) ? random.in(low[k], high[k]) : random.below(2) ? low[k] : high[k];
+        }
+        const Lattice lattice = format::lattice_for(low, high);
+        const double step = std::ldexp(1, lattice.step_exponent);
+        for (size_t k = 0; k < 3; ++k) {
+            ASSERT_GT(lattice.origin[k], -format::kMaxCoordinate);
+            ASSERT_LT(lattice.origin[k], format::kMaxCoordinate - UINT16_MAX);
+        }
+        const scenes::Point r = scenes::radii(random, 1000);
+        const Ellipsoid shape = scenes::ellipsoid({}, r, random.rotation());
+        const double s = size * random.log_in(1e-3, 1);
+        const double factor[6] = {s * shape.l11, s * shape.l21, s * shape.l22,
+                                  s * shape.l31, s * shape.l32, s * shape.l33};
+        PackedNode node;
+        format::quantise(node, lattice, center, factor);
+        const Ellipsoid e = format::decode(node, lattice);
+        const float decoded[3] = {e.center.x, e.center.y, e.center.z};
+        for (size_t k = 0; k < 3; ++k) ASSERT_LE(std::abs(decoded[k] - center[k]), step / 2) << i;
+        const double unit = std::ldexp(1, node.exponent - 16);
+        const float decoded_factor[6] = {e.l11, e.l21, e.l22, e.l31, e.l32, e.l33};
+        double largest = 0;
+        for (size_t k = 0; k < 6; ++k) {
+            const bool diagonal = k == 0 || k == 2 || k == 5;
+            largest = std::max(largest, std::abs(factor[k]));
+            const double error = std::abs(decoded_factor[k] - factor[k]);
+            ASSERT_LE(error, diagonal && factor[k] < unit ? unit : diagonal ? unit / 2 : unit) << i;
+        }
+        ASSERT_LE(unit, std::max(largest, 0x1p-100) * 0x1p-15 * 1.0001) << i; // 16 bits are used
+        // The lattice is no coarser than 16 bits across or 24 bits from zero ask for.
+        double extent = 0, reach = 0;
+        for (size_t k = 0; k < 3; ++k) {
+            extent = std::max(extent, high[k] - low[k]);
+            reach = std::max({reach, std::abs(low[k]), std::abs(high[k])});
+        }
+        ASSERT_LE(step, std::max({extent * 0x1p-14, reach * 0x1p-22, 0x1p-120})) << i;
+    }
+}
+
+TEST(Format, LatticeOfABoxBeyondTheFormatStaysDefined) {
+    const double low[3] = {-1e38, 1e38, 0}, high[3] = {1e38, 1e38, 0};
+    const Lattice lattice = format::lattice_for(low, high);
+    EXPECT_EQ(lattice.step_exponent, format::kMaxStepExponent);
+    for (const int32_t o : lattice.origin) {
+        EXPECT_GT(o, -format::kMaxCoordinate);
+        EXPECT_LT(o, format::kMaxCoordinate - UINT16_MAX);
+    }
+}
+
+// Found by fuzz_open: the thin axis came out as NaN, from a negative eigenvalue of L L^T.
+TEST(Format, PrincipalAxesOfTheFlattestNodes) {
+    Random random(4);
+    for (int i = 0; i < 20'000; ++i) {
+        PackedNode node;
+        for (size_t k = 0; k < 3; ++k) {
+            node.diagonal[k] = static_cast<uint16_t>(1 + random.below(3));
+            node.off_diagonal[k] = static_cast<int16_t>(random.next());
+        }
+        const Ellipsoid e = format::decode(node, {});
+        const PrincipalAxes axes = principal_axes(e);
+        ASSERT_TRUE(axes.radii[0] >= axes.radii[1] && axes.radii[1] >= axes.radii[2] && axes.radii[2] >= 0);
+        // The squares of the radii sum to the trace of L L^T.
+        const double trace = double{e.l11} * e.l11 + double{e.l21} * e.l21 + double{e.l22} * e.l22 +
+                             double{e.l31} * e.l31 + double{e.l32} * e.l32 + double{e.l33} * e.l33;
+        double sum = 0;
+        for (const double r : axes.radii) sum += r * r;
+        ASSERT_NEAR(sum, trace, 1e-12 * trace);
+    }
+}
+
+TEST(Format, RandomTreesOpen) {
+    Random random(3);
+    for (uint32_t degree = 2; degree <= kMaxDegree; ++degree) {
+        const auto scene = scenes::tree(random, scenes::cloud(random, 300),
+                                        {.degree = degree, .levels = 1 + random.below(6), .stop_probability = 0.2});
+        const auto tree = TreeView::open(scene.bytes);
+        ASSERT_TRUE(tree) << tree.error().what;
+        expect_sound(*tree);
+    }
+}
+
+// A folder of its own for each test.
+class Files : public testing::Test {
+protected:
+    void SetUp() override {
+        std::string name = (fs::temp_directory_path() / "prolate-format-XXXXXX").string();
+        ASSERT_NE(mkdtemp(name.data()), nullptr);
+        folder_ = name;
+    }
+    void TearDown() override { fs::remove_all(folder_); }
+    std::string path(const char* name) const { return (folder_ / name).string(); }
+    size_t entries() const { return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), {})); }
+    fs::path folder_;
+};
+
+TEST_F(Files, SaveThenLoad) {
+    const Bytes bytes = golden();
+    ASSERT_TRUE(save(path("a.etree").c_str(), bytes));
+    EXPECT_EQ(read(path("a.etree")), bytes);
+    auto tree = load(path("a.etree").c_str());
+    ASSERT_TRUE(tree);
+    EXPECT_TRUE(std::ranges::equal(tree->bytes(), bytes));
+    const Tree moved = std::move(*tree);
+    expect_sound(moved.view());
+    EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(Files, SaveReplacesAndKeepsPermissions) {
+    const Bytes bytes = golden();
+    std::ofstream(path("a.etree")) << "old";
+    fs::permissions(path("a.etree"), fs::perms(0640));
+    ASSERT_TRUE(save(path("a.etree").c_str(), bytes));
+    EXPECT_EQ(read(path("a.etree")), bytes);
+    EXPECT_EQ(fs::status(path("a.etree")).permissions(), fs::perms(0640));
+    EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(Files, ANewFileObeysTheUmask) {
+    const mode_t before = umask(027);
+    const auto saved = save(path("a.etree").c_str(), golden());
+    umask(before);
+    ASSERT_TRUE(saved);
+    EXPECT_EQ(fs::status(path("a.etree")).permissions(), fs::perms(0640));
+}
+
+TEST_F(Files, AFailedSaveLeavesTheOldFileAndNothingElse) {
+    std::ofstream(path("a.etree")) << "old";
+    // A file size limit stands for a full disk.
+    struct rlimit before {};
+    ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    struct rlimit small = before;
+    small.rlim_cur = 100;
+    ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const auto saved = save(path("a.etree").c_str(), golden());
+    setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, handler);
+    ASSERT_FALSE(saved);
+    EXPECT_EQ(saved.error().code, ErrorCode::io);
+    EXPECT_EQ(saved.error().where, static_cast<uint64_t>(EFBIG));
+    EXPECT_EQ(fs::file_size(path("a.etree")), 3u);
+    EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(Files, ErrorsNameTheirCause) {
+    const auto expect_io = [](const auto& result, int number) {
+        ASSERT_FALSE(result);
+        EXPECT_EQ(result.error().code, ErrorCode::io);
+        EXPECT_EQ(result.error().where, static_cast<uint64_t>(number));
+    };
+    expect_io(save("/dev/full", golden()), ENOSPC);
+    expect_io(save(folder_.c_str(), golden()), EISDIR);
+    expect_io(save(path("missing/a.etree").c_str(), golden()), ENOENT);
+    expect_io(load(folder_.c_str()), EISDIR);
+    expect_io(load(path("missing.etree").c_str()), ENOENT);
+    EXPECT_TRUE(save("/dev/null", golden()));
+    EXPECT_EQ(entries(), 0u);
+    std::ofstream(path("b.etree")) << "not a tree";
+    const auto tree = load(path("b.etree").c_str());
+    ASSERT_FALSE(tree);
+    EXPECT_EQ(tree.error().code, ErrorCode::bad_file);
+}
+
+TEST(Version, HeaderAndLibraryAgree) {
+    EXPECT_EQ(library_version(), kHeaderVersion);
+    EXPECT_EQ(kFormatVersion, 1); // a new version needs a new golden file and a row in FORMAT.md
+}
+
+} // namespace
+} // namespace prolate

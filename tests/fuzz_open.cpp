@@ -1,0 +1,79 @@
+// libFuzzer target: whatever the bytes, open() refuses them or every accessor and query answers, in range and finite.
+//
+//   cmake -S . -B build-fuzz -DCMAKE_CXX_COMPILER=clang++ -DPROLATE_BUILD_FUZZ=ON
+//   cmake --build build-fuzz --target fuzz_open
+//   build-fuzz/tests/fuzz_open -max_total_time=60 -max_len=4096 corpus tests/data
+//
+// Hashes are not checked, so that the fuzzer gets past them.
+#include <prolate/query.hpp>
+#include <prolate/tree.hpp>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+
+using namespace prolate;
+
+namespace {
+
+void require(bool holds) {
+    if (!holds) std::abort();
+}
+
+void check(const Ellipsoid& e) {
+    for (const float x : {e.center.x, e.center.y, e.center.z, e.l11, e.l21, e.l22, e.l31, e.l32, e.l33})
+        require(std::isfinite(x));
+    require(e.l11 > 0 && e.l22 > 0 && e.l33 > 0);
+    require(std::isfinite(volume(e)));
+    const PrincipalAxes axes = principal_axes(e);
+    for (const double r : axes.radii) require(std::isfinite(r));
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    const auto bytes = std::as_bytes(std::span(data, size));
+    const auto opened = TreeView::open(bytes, {.check_hash = false});
+    const auto hashed = TreeView::open(bytes);
+    require(opened || !hashed); // checking more never accepts more
+    if (!opened) {
+        require(opened.error().code == ErrorCode::bad_file || opened.error().code == ErrorCode::newer_version);
+        return 0;
+    }
+    const TreeView& tree = *opened;
+    uint64_t seen = 0;
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        require(tree.level(l).end_byte <= size);
+        tree.for_each_in_cut(l, [&](uint32_t) { ++seen; });
+    }
+    require(seen >= tree.level_count() && tree.degree() >= 2 && tree.degree() <= kMaxDegree);
+    (void)tree.bake_info();
+    for (uint32_t n = 0; n < tree.node_count(); ++n) {
+        check(tree.ellipsoid(n));
+        const ChildRange children = tree.children(n);
+        require(children.count == 0 || (children.first > n && children.first + children.count <= tree.node_count()));
+    }
+
+    // Poses: the end of the input, as floats of any kind, and tamer ones of the tree's size.
+    CollideContext context;
+    const QueryOptions options{.max_level = data[size - 1] % 40u, .max_pair_tests = 500};
+    Pose wild[2];
+    std::memcpy(wild, data + size - sizeof wild, sizeof wild);
+    const Ellipsoid root = tree.ellipsoid(0);
+    const float reach = static_cast<float>(data[size - 2]) / 64 * root.l11;
+    const Pose tame{{reach, -reach, reach / 2}, {1, static_cast<float>(data[size - 3]), 3, 4}};
+    const auto ask = [&](const Pose& a, const Pose& b) {
+        const CollideResult ab = collide(tree, a, tree, b, context, options);
+        const CollideResult ba = collide(tree, b, tree, a, context, options);
+        require(ab.verdict == ba.verdict && ab.stats.pair_tests == ba.stats.pair_tests);
+        require(ab.stats.pair_tests <= options.max_pair_tests && ab.stats.deepest_level < tree.level_count());
+        require(ab.node_a < tree.node_count() && ab.node_b < tree.node_count());
+        // A body never lies apart from itself, unless moved.
+        require(std::memcmp(&a, &b, sizeof a) != 0 || ab.verdict != Verdict::separated);
+    };
+    ask(wild[0], wild[1]);
+    ask(tame, tame);
+    ask({}, tame);
+    return 0;
+}
