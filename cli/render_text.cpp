@@ -3,8 +3,7 @@
 #include <algorithm>
 
 #include <fontconfig/fontconfig.h>
-#include <ft2build.h>
-#include FT_FREETYPE_H
+#include <freetype/freetype.h>
 
 namespace prolate::cli {
 namespace {

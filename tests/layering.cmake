@@ -33,7 +33,7 @@ set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 set(cli_headers ".*")
 set(cli_folders "src|builder|query|cli")
 set(cli_libraries
-  "CLI/.*|fmt/.*|nlohmann/.*|png\\.h|embree3/.*|glm/.*|tbb/.*|oneapi/tbb/.*|ft2build\\.h|freetype/.*|fontconfig/.*|${posix}")
+  "CLI/.*|fmt/.*|nlohmann/.*|png\\.h|embree3/.*|glm/.*|tbb/.*|oneapi/tbb/.*|freetype/.*|fontconfig/.*|${posix}")
 
 # Single files that may have one library more: the gateways.
 set(extra_include/prolate/eigen.hpp "Eigen/.*")
