@@ -17,7 +17,7 @@ namespace {
 using glm::dvec3;
 
 constexpr double kMargin = 0.07;       // around what is shown, of its own size
-constexpr uint32_t kSmallestCell = 48; // pixels: below that a panel shows nothing
+constexpr uint32_t kSmallestCell = 96; // pixels: narrower captions could not be read
 
 struct Panel {
     Scene scene;
@@ -45,7 +45,7 @@ Layout choose_layout(uint32_t panels, const SheetOptions& o, const Window& shown
         l.cell_height = o.height / l.rows;
         if (std::min(l.cell_width, l.cell_height) < kSmallestCell) continue;
         l.text = std::clamp(std::min(l.cell_width / 26, l.cell_height / 22), 8u, 64u);
-        l.caption = l.text * 2;
+        l.caption = l.text * 2 + 4;
         l.scale = std::min(l.cell_width / (shown.u1 - shown.u0), (l.cell_height - l.caption) / (shown.v1 - shown.v0));
         // No more height than the picture needs, so that its caption stays near.
         const auto needed = static_cast<uint32_t>(std::ceil(l.scale * (shown.v1 - shown.v0)));
@@ -75,25 +75,42 @@ std::string caption_of(const TreeView& tree, uint32_t level, size_t nodes) {
     return text;
 }
 
-// Draws `text` in black, centered in the strip; as large as `size` if it fits.
-void draw_caption(Sheet& sheet, const Font& font, const std::string& text, uint32_t size, uint32_t left, uint32_t width,
-                  uint32_t top, uint32_t height) {
-    TextImage line = font.draw(text, size);
-    while (line.width > width && size > 6) line = font.draw(text, --size);
-    const int x0 = static_cast<int>(left) + (static_cast<int>(width) - static_cast<int>(line.width)) / 2;
-    const int y0 = static_cast<int>(top) + (static_cast<int>(height) - static_cast<int>(line.height)) / 2;
-    for (int y = 0; y < static_cast<int>(line.height); ++y)
-        for (int x = 0; x < static_cast<int>(line.width); ++x) {
-            const int sx = x0 + x, sy = y0 + y;
-            if (sx < static_cast<int>(left) || sx >= static_cast<int>(left + width) || sy < 0 ||
-                sy >= static_cast<int>(sheet.height))
-                continue;
+// Draws `line` in dark grey with its upper left corner at (x0, y0).
+void draw_line(Sheet& sheet, const TextImage& line, uint32_t x0, uint32_t y0) {
+    for (uint32_t y = 0; y < line.height && y0 + y < sheet.height; ++y)
+        for (uint32_t x = 0; x < line.width && x0 + x < sheet.width; ++x) {
             const uint32_t ink = line.coverage[size_t{line.width} * y + x];
             for (size_t channel = 0; channel < 3; ++channel) {
-                uint8_t& value = sheet.rgb[(size_t{sheet.width} * sy + sx) * 3 + channel];
+                uint8_t& value = sheet.rgb[(size_t{sheet.width} * (y0 + y) + x0 + x) * 3 + channel];
                 value = static_cast<uint8_t>((value * (255 - ink) + 32 * ink + 127) / 255);
             }
         }
+}
+
+// Draws `text` centered in the strip, in letters of `size` if they fit, else smaller, else in two lines.
+void draw_caption(Sheet& sheet, const Font& font, const std::string& text, uint32_t size, uint32_t left, uint32_t width,
+                  uint32_t top, uint32_t height) {
+    const auto lines_of = [&](const std::vector<std::string>& texts, uint32_t largest, uint32_t smallest) {
+        std::vector<TextImage> lines;
+        for (uint32_t pixels = largest; pixels >= smallest; --pixels) {
+            lines.clear();
+            for (const std::string& t : texts) lines.push_back(font.draw(t, pixels));
+            const bool fits = std::all_of(lines.begin(), lines.end(), [&](const TextImage& line) {
+                return line.width <= width && line.height * lines.size() <= height;
+            });
+            if (fits) return lines;
+        }
+        return std::vector<TextImage>{};
+    };
+    auto lines = lines_of({text}, size, std::min(size, 10u));
+    const size_t comma = text.find(", ");
+    if (lines.empty() && comma != std::string::npos)
+        lines = lines_of({text.substr(0, comma + 1), text.substr(comma + 2)}, size, 5);
+    uint32_t y = top + (height - static_cast<uint32_t>(lines.size()) * (lines.empty() ? 0 : lines[0].height)) / 2;
+    for (const TextImage& line : lines) {
+        draw_line(sheet, line, left + (width - line.width) / 2, y);
+        y += line.height;
+    }
 }
 
 void paste(Sheet& sheet, const PanelImage& image, uint32_t left, uint32_t top) {
@@ -110,7 +127,7 @@ void paste(Sheet& sheet, const PanelImage& image, uint32_t left, uint32_t top) {
 Result<void> check(const TreeView& tree, const SheetOptions& o) {
     const auto bad = [](const char* what, uint64_t where) { return Error{ErrorCode::bad_options, what, where}; };
     for (const uint32_t side : {o.width, o.height})
-        if (side < 64 || side > 8192) return bad("a picture's side is not 64 ... 8192 pixels", side);
+        if (side < kSmallestCell || side > 8192) return bad("a picture's side is not 96 ... 8192 pixels", side);
     if (o.samples < 16 || o.samples > 1024) return bad("samples a pixel are not 16 ... 1024", o.samples);
     if (o.levels.empty()) return bad("no level to show", 0);
     for (const uint32_t level : o.levels)

@@ -14,7 +14,7 @@
 namespace prolate::cli {
 
 struct SheetOptions {
-    uint32_t width = 1600, height = 1200; ///< pixels, 64 ... 8192 each
+    uint32_t width = 1600, height = 1200; ///< pixels, 96 ... 8192 each
     std::vector<uint32_t> levels;         ///< to show, each below the tree's level count; not empty
     View view;
     uint32_t samples = 25; ///< a pixel, 16 ... 1024; rounded up to a square number

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -41,19 +42,20 @@ Tree make_tree(const std::vector<std::vector<TestNode>>& levels, uint32_t degree
     return std::move(*tree);
 }
 
-// A root, `degree` children on a circle, and as many below each of them.
-Tree three_levels(uint8_t degree) {
-    std::vector<std::vector<TestNode>> levels(3);
-    levels[0].push_back({{0, 0, 0}, {3, 0.5, 2, 0.2, -0.4, 2.5}, degree});
-    for (int i = 0; i < degree; ++i) {
-        const double a = 2 * std::numbers::pi * i / degree, x = 2 * std::cos(a), y = 2 * std::sin(a);
-        levels[1].push_back({{x, y, 0}, {0.8, 0.1, 0.7, 0.1, 0.2, 0.6}, degree});
-        for (int j = 0; j < degree; ++j) {
-            const double b = 2 * std::numbers::pi * j / degree;
-            levels[2].push_back(
-                {{x + 0.4 * std::cos(b), y + 0.4 * std::sin(b), 0.3 * (j % 2)}, {0.3, 0.05, 0.25, 0, 0.05, 0.3}});
+// A root, `degree` children on a circle around it, as many around each of them, and so on.
+Tree nested_circles(uint8_t degree, size_t depth = 3) {
+    std::vector<std::vector<TestNode>> levels(depth);
+    levels[0].push_back({{0, 0, 0}, {3, 0.5, 2, 0.2, -0.4, 2.5}});
+    for (size_t l = 1; l < depth; ++l)
+        for (TestNode& parent : levels[l - 1]) {
+            parent.children = degree;
+            const double s = std::pow(0.4, static_cast<double>(l));
+            for (int i = 0; i < degree; ++i) {
+                const double a = 2 * std::numbers::pi * i / degree, *c = parent.center;
+                levels[l].push_back({{c[0] + 4 * s * std::cos(a), c[1] + 4 * s * std::sin(a), c[2] + s * (i % 2)},
+                                     {2 * s, 0.3 * s, 1.6 * s, 0.2 * s, 0.5 * s, 1.4 * s}});
+            }
         }
-    }
     return make_tree(levels, degree);
 }
 
@@ -78,23 +80,33 @@ PanelSettings settings_for(const View& view) {
 }
 
 TEST(Render, SilhouetteIsTheEllipsoids) {
-    const TestNode shapes[] = {{{0.3, -0.2, 0.5}, {2, 0.7, 0.5, -0.3, 0.8, 1}},
-                               {{0, 0, 0}, {1, 0, 1, 0, 0, 1}},
-                               {{1, 2, 3}, {0.05, 0.9, 0.04, 1.5, -0.02, 0.06}}}; // a needle
-    for (const TestNode& shape : shapes) {
-        const Tree tree = make_tree({{shape}}, 2);
-        const Ellipsoid e = tree.view().ellipsoid(0);
+    const TestNode tilted = {{0.3, -0.2, 0.5}, {2, 0.7, 0.5, -0.3, 0.8, 1}};
+    const TestNode sphere = {{0, 0, 0}, {1, 0, 1, 0, 0, 1}};
+    const TestNode needle = {{1, 2, 3}, {0.05, 0.9, 0.04, 1.5, -0.02, 0.06}};
+    const TestNode apart[] = {{{-2, 0, 0}, {0.1, 0.6, 0.2, 0.9, 0.5, 0.1}},
+                              {{2, 1, -1}, {0.2, -0.5, 0.1, 0.2, 1, 0.1}}};
+    for (const std::vector<TestNode>& shapes :
+         {std::vector{tilted}, std::vector{sphere}, std::vector{needle}, std::vector{apart[0], needle, apart[1]}}) {
+        TestNode root = sphere;
+        root.children = static_cast<uint8_t>(shapes.size());
+        const Tree tree = make_tree({{root}, shapes}, 3);
+        std::vector<Ellipsoid> ellipsoids;
+        std::vector<uint32_t> nodes;
         Box box;
-        box.add(e);
+        for (uint32_t node = 1; node < tree.view().node_count(); ++node) {
+            nodes.push_back(node);
+            box.add(ellipsoids.emplace_back(tree.view().ellipsoid(node)));
+        }
         const Frame frame = box.frame();
-        const Scene scene(tree.view(), {0}, frame);
+        const Scene scene(tree.view(), nodes, frame);
         for (const View& view : {View{30, 18, UpAxis::y}, View{-100, -40, UpAxis::z}, View{200, 70, UpAxis::minus_x}}) {
             PanelSettings s = settings_for(view);
             const Window tight = scene.window(s.camera);
             const double du = tight.u1 - tight.u0, dv = tight.v1 - tight.v0;
             s.window = {tight.u0 - 0.1 * du, tight.u1 + 0.1 * du, tight.v0 - 0.1 * dv, tight.v1 + 0.1 * dv};
             PanelImage image;
-            ASSERT_TRUE(render_panel(scene, {dvec3(0.5)}, s, nullptr, image));
+            s.floor_shadow = view.elevation > 0;
+            ASSERT_TRUE(render_panel(scene, std::vector(nodes.size(), dvec3(0.5)), s, nullptr, image));
 
             constexpr int kFine = 16;
             int inside = 0, outside = 0, partial = 0;
@@ -105,8 +117,10 @@ TEST(Render, SilhouetteIsTheEllipsoids) {
                         for (int j = 0; j <= kFine; ++j) {
                             const double px = (x + double(i) / kFine) / s.width;
                             const double py = (y + double(j) / kFine) / s.height;
-                            hits += meets(e, frame, s.camera, s.window.u0 + px * (s.window.u1 - s.window.u0),
-                                          s.window.v1 - py * (s.window.v1 - s.window.v0));
+                            const double u = s.window.u0 + px * (s.window.u1 - s.window.u0);
+                            const double v = s.window.v1 - py * (s.window.v1 - s.window.v0);
+                            hits += std::any_of(ellipsoids.begin(), ellipsoids.end(),
+                                                [&](const Ellipsoid& e) { return meets(e, frame, s.camera, u, v); });
                         }
                     const double truth = hits / double((kFine + 1) * (kFine + 1));
                     const double seen = image.coverage[size_t{s.width} * y + x];
@@ -160,23 +174,28 @@ double hue_difference(double a, double b) {
 
 TEST(Render, DescendantsKeepTheHue) {
     for (const uint8_t degree : {uint8_t{2}, uint8_t{8}, uint8_t{13}}) {
-        const Tree tree = three_levels(degree);
+        const Tree tree = nested_circles(degree, 4);
         const TreeView view = tree.view();
         const auto colours = node_colours(view);
         ASSERT_EQ(colours.size(), view.node_count());
         EXPECT_LT(colours[0].chroma, 0.01); // the root is grey
-        for (uint32_t i = 1; i <= degree; ++i) {
-            const Oklch shown = to_oklch(to_linear_rgb(colours[i]));
-            const ChildRange range = view.children(i);
-            ASSERT_EQ(range.count, degree);
-            for (uint32_t child = range.first; child < range.first + range.count; ++child) {
-                const Oklch c = to_oklch(to_linear_rgb(colours[child]));
-                EXPECT_LT(hue_difference(c.hue, shown.hue), 0.01) << "node " << child << " below " << i;
-                EXPECT_NEAR(c.lightness, shown.lightness, 0.1);
-                EXPECT_GT(c.chroma, 0.03);
+        // The node of level 1 that each node descends from, by its own walk down the tree.
+        std::vector<uint32_t> branch(view.node_count());
+        for (uint32_t node = 0; node < view.node_count(); ++node) {
+            const ChildRange range = view.children(node);
+            for (uint32_t child = range.first; child < range.first + range.count; ++child)
+                branch[child] = node == 0 ? child : branch[node];
+            // Siblings of one hue differ in lightness.
+            if (node != 0 && range.count > 1) {
+                EXPECT_GT(std::abs(colours[range.first].lightness - colours[range.first + 1].lightness), 0.02);
             }
-            // Siblings in the same hue differ in lightness.
-            EXPECT_GT(std::abs(colours[range.first].lightness - colours[range.first + 1].lightness), 0.02);
+        }
+        for (uint32_t node = 1; node < view.node_count(); ++node) {
+            const Oklch c = to_oklch(to_linear_rgb(colours[node]));
+            const Oklch top = to_oklch(to_linear_rgb(colours[branch[node]]));
+            EXPECT_LT(hue_difference(c.hue, top.hue), 0.01) << "node " << node << " below " << branch[node];
+            EXPECT_NEAR(c.lightness, top.lightness, 0.1);
+            EXPECT_GT(c.chroma, 0.03);
         }
     }
 }
@@ -225,7 +244,7 @@ Mesh tetrahedron() {
 }
 
 TEST(Render, SameBytesForAnyNumberOfThreads) {
-    const Tree tree = three_levels(6);
+    const Tree tree = nested_circles(6);
     const Mesh mesh = tetrahedron();
     std::vector<std::byte> first;
     for (const uint32_t threads : {1u, 2u, 4u, 1u}) {
@@ -247,9 +266,11 @@ TEST(Render, SameBytesForAnyNumberOfThreads) {
 
 // Nothing may be cut off: the outermost pixels are paper, whatever the shape and the view.
 TEST(Render, SheetBorderIsPaper) {
-    const Tree tree = three_levels(5);
-    for (const View& view : {View{30, 18, UpAxis::y}, View{77, 60, UpAxis::x}, View{-20, -30, UpAxis::minus_z}}) {
+    const Tree tree = nested_circles(5);
+    for (const View& view :
+         {View{30, 18, UpAxis::y}, View{77, 60, UpAxis::x}, View{-20, -30, UpAxis::minus_z}, View{30, 18, UpAxis::z}}) {
         SheetOptions o = small_sheet();
+        if (view.up == UpAxis::z) o.width = 100; // the floor shadow reaches beyond a narrow picture
         o.levels = {0};
         o.view = view;
         const auto sheet = render_sheet(tree.view(), std::nullopt, o);
@@ -267,7 +288,7 @@ TEST(Render, SheetBorderIsPaper) {
 }
 
 TEST(Render, RefusesBadOptions) {
-    const Tree tree = three_levels(3);
+    const Tree tree = nested_circles(3);
     const auto code = [&tree](auto change) {
         SheetOptions o = small_sheet();
         change(o);
@@ -276,7 +297,7 @@ TEST(Render, RefusesBadOptions) {
     };
     EXPECT_EQ(code([](SheetOptions&) {}), ErrorCode{});
     EXPECT_EQ(code([](SheetOptions& o) { o.width = 0; }), ErrorCode::bad_options);
-    EXPECT_EQ(code([](SheetOptions& o) { o.width = 63; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& o) { o.width = 95; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](SheetOptions& o) { o.height = 8193; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](SheetOptions& o) { o.samples = 15; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](SheetOptions& o) { o.samples = 1025; }), ErrorCode::bad_options);
@@ -285,7 +306,7 @@ TEST(Render, RefusesBadOptions) {
     EXPECT_EQ(code([](SheetOptions& o) { o.view.elevation = 90; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](SheetOptions& o) { o.view.azimuth = NAN; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](SheetOptions& o) {
-                  o.width = o.height = 64;
+                  o.width = o.height = 96;
                   o.levels = {0, 1, 2, 0, 1, 2};
               }),
               ErrorCode::bad_options);
