@@ -99,15 +99,18 @@ void tree_tree(benchmark::State& state, uint32_t levels, double offset) {
     const auto scene_a = make(), scene_b = make();
     const TreeView a = *TreeView::open(scene_a.bytes), b = *TreeView::open(scene_b.bytes);
     CollideContext context;
-    std::vector<std::pair<Pose, Pose>> poses(256);
+    struct Placement {
+        Pose a, b;
+    };
+    std::vector<Placement> poses(256);
     Hash hash;
     uint64_t pair_tests = 0, evaluations = 0;
-    for (auto& [pose_a, pose_b] : poses) {
-        pose_a.rotation = random.rotation(), pose_b.rotation = random.rotation();
+    for (Placement& pose : poses) {
+        pose.a.rotation = random.rotation(), pose.b.rotation = random.rotation();
         const Point d = random.direction();
         const auto at = [&](double t) {
-            pose_b.translation = scenes::to_float({t * d[0], t * d[1], t * d[2]});
-            return collide(a, pose_a, b, pose_b, context);
+            pose.b.translation = scenes::to_float({t * d[0], t * d[1], t * d[2]});
+            return collide(a, pose.a, b, pose.b, context);
         };
         double low = 0, high = 8;
         for (int i = 0; i < 24; ++i) {
@@ -120,8 +123,7 @@ void tree_tree(benchmark::State& state, uint32_t levels, double offset) {
     }
     size_t i = 0;
     for (auto _ : state) {
-        const auto& [pose_a, pose_b] = poses[i];
-        benchmark::DoNotOptimize(collide(a, pose_a, b, pose_b, context));
+        benchmark::DoNotOptimize(collide(a, poses[i].a, b, poses[i].b, context));
         i = (i + 1) % poses.size();
     }
     state.counters["pair_tests"] = static_cast<double>(pair_tests) / static_cast<double>(poses.size());

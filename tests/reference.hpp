@@ -138,9 +138,10 @@ inline Real projected(const Pair& pair) {
     const Matrix to_ball = inverse(pair.l1);
     const Vector center = to_ball * pair.r;
     const Matrix l = to_ball * pair.l2;
-    const auto [squares, axes] = eigen(l * transposed(l)); // squared semi-axes of B's image
-    const Vector y = transposed(axes) * center;            // A's center seen from B's, up to sign
-    const auto excess = [&](Real t) {                      // nearest point x_i = s_i y_i / (s_i + t), on B's border
+    const auto image = eigen(l * transposed(l));        // of B
+    const Vector& squares = image.first;                // semi-axes, squared
+    const Vector y = transposed(image.second) * center; // A's center seen from B's, up to sign
+    const auto excess = [&](Real t) {                   // nearest point x_i = s_i y_i / (s_i + t), on B's border
         Real sum = -1;
         for (size_t i = 0; i < 3; ++i) sum += squares[i] * y[i] * y[i] / ((squares[i] + t) * (squares[i] + t));
         return sum;
