@@ -41,8 +41,10 @@ std::vector<Pair> pairs(double ratio, double spread) {
     Random random(1);
     std::vector<Pair> out(4096);
     for (Pair& p : out) {
-        p.a = scenes::ellipsoid({}, scenes::radii(random, ratio), random.rotation());
-        p.b = scenes::ellipsoid({}, scenes::radii(random, ratio), random.rotation());
+        for (Ellipsoid* e : {&p.a, &p.b}) { // one draw a statement: the order of arguments differs between compilers
+            const Point r = scenes::radii(random, ratio);
+            *e = scenes::ellipsoid({}, r, random.rotation());
+        }
         const Point d = random.direction();
         p.pose_a.rotation = random.rotation(), p.pose_b.rotation = random.rotation();
         p.pose_b.translation = scenes::to_float(d);
