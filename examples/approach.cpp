@@ -1,6 +1,6 @@
 // Lets two baked solids approach each other, and prints when the verdict turns.    approach A.etree B.etree
 //
-// A stays; B comes along the x axis in 100 steps, from where the root ellipsoids are apart until their centers meet.
+// A stays; B comes along the x axis in 100 poses, from well apart until the centers of the root ellipsoids meet.
 // One context serves all queries, as it would in the loop of a simulator.
 #include <prolate/query.hpp>
 
@@ -23,10 +23,10 @@ int main(int argc, char** argv) {
     for (const auto* tree : {&a, &b})
         if (!*tree) return std::fprintf(stderr, "approach: %s\n", tree->error().what), 1;
 
-    // Along x, an ellipsoid reaches |transpose(L) x| = l11 to either side of its center. That sets the path's length,
-    // so that models of any size and place will do.
+    // Along x, an ellipsoid reaches |transpose(L) x| = l11 to either side of its center, so the roots lie side by side
+    // when their centers are the sum apart. Twice that sets the path's length: models of any size and place will do.
     const prolate::Ellipsoid root_a = a->view().ellipsoid(0), root_b = b->view().ellipsoid(0);
-    const float start = 1.01f * (root_a.l11 + root_b.l11);
+    const float start = 2 * (root_a.l11 + root_b.l11);
 
     prolate::CollideContext context;
     prolate::Pose pose; // of B; the rotation stays the identity
