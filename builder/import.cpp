@@ -152,9 +152,11 @@ Result<Mesh> flatten(const aiScene& scene, bool skip_root_transform) {
     return out;
 }
 
+// Faces of three or more corners, as check_mesh_bytes() counts them.
 uint64_t count_faces(const aiScene& scene) {
     uint64_t faces = 0;
-    for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes)) faces += mesh->mNumFaces;
+    for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes))
+        for (const aiFace& face : std::span(mesh->mFaces, mesh->mNumFaces)) faces += face.mNumIndices >= 3;
     return faces;
 }
 

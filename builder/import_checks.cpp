@@ -141,6 +141,7 @@ Check check_off(std::string_view bytes, std::string& detail) {
         if (!first || !is_coordinate(text.word()) || !is_coordinate(text.word()))
             return bad_text(bytes, kBadVertex, line_at, detail);
     }
+    uint64_t counted = 0;
     for (uint32_t i = 0; i < *faces; ++i) {
         text.next_line();
         const auto corners = number<uint32_t>(text.first_word());
@@ -151,8 +152,9 @@ Check check_off(std::string_view bytes, std::string& detail) {
             if (!index) return bad_text(bytes, kBadFace, line_at, detail);
             if (*index >= *vertices) return bad_text(bytes, kBadIndex, line_at, detail);
         }
+        counted += *corners >= 3;
     }
-    return std::optional(uint64_t{*faces});
+    return std::optional(counted);
 }
 
 // STL: binary if the size says so, else text, which must come to its "endsolid".
@@ -189,18 +191,17 @@ public:
     Check check() {
         if (text_.word() != "ply") return bad_text(bytes_, "not a PLY file", 0, detail_);
         if (!read_header()) return bad_text(bytes_, "a PLY header that cannot be read", text_.word_at(), detail_);
-        uint64_t vertices = 0, faces = 0;
+        uint64_t vertices = 0;
         for (const Element& element : elements_) {
             if (element.name == "vertex") vertices = element.count;
             if (element.properties.empty() && element.count > 0) // or a tiny file could ask for endless work
                 return bad_text(bytes_, "a PLY element without properties", 0, detail_);
         }
         for (const Element& element : elements_) {
-            if (element.name == "face") faces = element.count;
             for (uint64_t i = 0; i < element.count; ++i)
                 if (const auto read = read_one(element, vertices); !read) return read.error();
         }
-        return std::optional(faces);
+        return std::optional(faces_);
     }
 
 private:
@@ -285,6 +286,7 @@ private:
             const auto length = value(*property.length);
             if (!length || !(*length >= 0)) return bad_text_or_bytes(kTooShort, line_at);
             if (property.is_corners && *length < 1) return bad_text_or_bytes(kBadFace, line_at);
+            faces_ += property.is_corners && *length >= 3;
             for (double i = 0; i < *length; ++i) {
                 const auto index = value(property.value);
                 if (!index) return bad_text_or_bytes(kTooShort, line_at);
@@ -324,6 +326,7 @@ private:
     std::vector<Element> elements_;
     std::string_view pending_; // first word of a text line, already taken
     size_t data_ = 0;          // next binary value
+    uint64_t faces_ = 0;
     bool is_text_ = false, is_big_endian_ = false;
 };
 

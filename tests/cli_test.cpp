@@ -1,0 +1,545 @@
+// The prolate command as its user meets it: exit codes, one line for each error, nothing half-written.
+#include <prolate/mesh.hpp>
+#include <prolate/tree.hpp>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <thread>
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace prolate {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+// ---- meshes ----
+
+// The unit cube's surface, each side cut into n x n squares, its points then moved by `shape`.
+Mesh box_mesh(uint32_t n, const std::function<Vec3(double, double, double)>& shape) {
+    Mesh soup;
+    for (int axis = 0; axis < 3; ++axis)
+        for (int side = 0; side < 2; ++side)
+            for (uint32_t i = 0; i < n; ++i)
+                for (uint32_t j = 0; j < n; ++j) {
+                    const auto base = static_cast<uint32_t>(soup.vertices.size());
+                    for (const auto& [u, v] : {std::pair{i, j}, {i + 1, j}, {i + 1, j + 1}, {i, j + 1}}) {
+                        double p[3];
+                        p[axis] = 2.0 * side - 1;
+                        p[(axis + 1) % 3] = 2.0 * u / n - 1;
+                        p[(axis + 2) % 3] = 2.0 * v / n - 1;
+                        soup.vertices.push_back(shape(p[0], p[1], p[2]));
+                    }
+                    Triangle a{base, base + 1, base + 2}, b{base, base + 2, base + 3};
+                    if (side == 0) std::swap(a[1], a[2]), std::swap(b[1], b[2]);
+                    soup.triangles.insert(soup.triangles.end(), {a, b});
+                }
+    return soup;
+}
+Mesh cube(float size = 1) {
+    return box_mesh(1, [size](double x, double y, double z) {
+        return Vec3{size * static_cast<float>(x), size * static_cast<float>(y), size * static_cast<float>(z)};
+    });
+}
+// A bent, waisted body: nothing that one ellipsoid fits well.
+Mesh peanut(uint32_t n) {
+    return box_mesh(n, [](double x, double y, double z) {
+        const double length = std::hypot(x, y, z), waist = 0.5 + 0.5 * x * x;
+        return Vec3{static_cast<float>(2 * x / length), static_cast<float>(waist * y / length + 0.3 * x * x),
+                    static_cast<float>(waist * z / length)};
+    });
+}
+
+std::string obj_text(const Mesh& mesh) {
+    std::ostringstream out;
+    out.precision(9);
+    for (const Vec3& v : mesh.vertices) out << "v " << v.x << ' ' << v.y << ' ' << v.z << '\n';
+    for (const Triangle& t : mesh.triangles) out << "f " << t[0] + 1 << ' ' << t[1] + 1 << ' ' << t[2] + 1 << '\n';
+    return out.str();
+}
+
+// ---- running the command ----
+
+std::string read(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+void write(const fs::path& path, std::string_view content) {
+    std::ofstream(path, std::ios::binary).write(content.data(), static_cast<std::streamsize>(content.size()));
+}
+
+struct Outcome {
+    int code = -1; // exit code, or minus the signal
+    std::string out, err;
+};
+
+struct RunOptions {
+    std::string stdout_path;                // instead of a file that is read back
+    std::function<void()> in_child = [] {}; // after fork; only async-signal-safe calls
+    bool interrupt = false;                 // Ctrl-C as soon as the program catches it
+};
+
+// Does the process catch SIGINT yet?
+bool catches_interrupt(pid_t pid) {
+    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("SigCgt:")) return (std::stoull(line.substr(7), nullptr, 16) & (1u << (SIGINT - 1))) != 0;
+    return false;
+}
+
+class Cli : public ::testing::Test {
+protected:
+    // One bake for all tests that only need some tree.
+    static void SetUpTestSuite() {
+        std::string name = (fs::temp_directory_path() / "prolate-cli-XXXXXX").string();
+        ASSERT_NE(::mkdtemp(name.data()), nullptr);
+        shared_ = name;
+        write(shared_ / "peanut.obj", obj_text(peanut(8)));
+        const Outcome baked = run({"bake", shared("peanut.obj"), "-o", shared("peanut.etree"), "--levels", "2",
+                                   "--degree", "4", "--quality", "fast", "--report", shared("report.json")});
+        ASSERT_EQ(baked.code, 0) << baked.err;
+        baked_out_ = baked.out;
+        baked_err_ = baked.err;
+    }
+    static void TearDownTestSuite() { fs::remove_all(shared_); }
+    void SetUp() override {
+        folder_ = shared_ / ::testing::UnitTest::GetInstance()->current_test_info()->name();
+        fs::create_directory(folder_);
+    }
+
+    static std::string shared(const std::string& name) { return (shared_ / name).string(); }
+    std::string file(const std::string& name) const { return (folder_ / name).string(); }
+    std::string file(const std::string& name, std::string_view content) const {
+        write(folder_ / name, content);
+        return file(name);
+    }
+    std::vector<std::string> listing() const {
+        std::vector<std::string> names;
+        for (const auto& entry : fs::directory_iterator(folder_)) names.push_back(entry.path().filename());
+        std::sort(names.begin(), names.end());
+        return names;
+    }
+
+    static Outcome run(const std::vector<std::string>& arguments, const RunOptions& options = {}) {
+        const std::string out = shared(".stdout"), err = shared(".stderr");
+        std::vector<char*> argv{const_cast<char*>(PROLATE_COMMAND)};
+        for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+        argv.push_back(nullptr);
+        const std::string& target = options.stdout_path.empty() ? out : options.stdout_path;
+        const pid_t pid = ::fork();
+        if (pid == 0) {
+            ::dup2(::open(target.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), 1);
+            ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), 2);
+            options.in_child();
+            ::execv(PROLATE_COMMAND, argv.data());
+            ::_exit(127);
+        }
+        int status = 0;
+        if (options.interrupt) {
+            while (!catches_interrupt(pid) && ::waitpid(pid, &status, WNOHANG) == 0) std::this_thread::yield();
+            ::kill(pid, SIGINT);
+        }
+        ::waitpid(pid, &status, 0);
+        return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
+                options.stdout_path.empty() ? read(out) : "", read(err)};
+    }
+
+    // Fails with `code` and the one line "prolate: <subject>: <...words...>; <advice>".
+    static void expect_failure(const Outcome& o, int code, const std::string& subject, const std::string& words) {
+        EXPECT_EQ(o.code, code) << o.err;
+        EXPECT_EQ(o.out, "");
+        EXPECT_TRUE(o.err.starts_with("prolate: " + subject + ": ")) << o.err;
+        EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << o.err;
+        EXPECT_NE(o.err.find(words), std::string::npos) << o.err;
+        EXPECT_NE(o.err.find("; "), std::string::npos) << "says what to do: " << o.err;
+    }
+    // Baking the file `mesh` fails so, and leaves nothing but it.
+    void expect_bake_fails(const std::string& mesh, int code, const std::string& words) {
+        SCOPED_TRACE(mesh);
+        const auto before = listing();
+        expect_failure(run({"bake", mesh, "-o", file("out.etree"), "--report", file("report.json")}), code, mesh,
+                       words);
+        EXPECT_EQ(listing(), before);
+    }
+
+    static inline fs::path shared_;
+    static inline std::string baked_out_, baked_err_;
+    fs::path folder_;
+};
+
+// ---- bake ----
+
+TEST_F(Cli, BakeReportsEachLevel) {
+    std::istringstream lines(baked_out_);
+    std::string line;
+    std::getline(lines, line);
+    for (const char* column : {"level", "nodes", "outside ratio", "covered", "bytes", "seconds"})
+        EXPECT_NE(line.find(column), std::string::npos) << line;
+    int levels = 0;
+    for (; std::getline(lines, line); ++levels) EXPECT_NE(line.find("yes"), std::string::npos) << line;
+    EXPECT_EQ(levels, 3);
+    EXPECT_EQ(baked_err_.find('\r'), std::string::npos) << "no progress line where stderr is no terminal";
+    EXPECT_NE(baked_err_.find("were merged"), std::string::npos) << baked_err_;
+
+    const Json report = Json::parse(read(shared("report.json")));
+    ASSERT_EQ(report["levels"].size(), 3u);
+    EXPECT_EQ(report["levels"][0]["nodes"], 1);
+    EXPECT_EQ(report["levels"][2]["bytes"], fs::file_size(shared("peanut.etree")));
+    EXPECT_TRUE(report["diagnosis"]["closed"]);
+}
+
+TEST_F(Cli, BakeIsTheSameForAnyNumberOfThreadsAndThroughAPipe) {
+    const auto options = [](const std::string& output, const char* threads) {
+        return std::vector<std::string>{"bake", shared("peanut.obj"), "-o",   output,      "--levels", "2", "--degree",
+                                        "4",    "--quality",          "fast", "--threads", threads};
+    };
+    const Outcome piped = run(options("-", "1"));
+    EXPECT_EQ(piped.code, 0) << piped.err;
+    EXPECT_TRUE(piped.out == read(shared("peanut.etree"))) << "the pipe holds the tree and nothing else";
+    EXPECT_NE(piped.err.find("outside ratio"), std::string::npos) << "the table went to stderr: " << piped.err;
+    const Outcome filed = run(options(file("a.etree"), "2"));
+    EXPECT_EQ(filed.code, 0) << filed.err;
+    EXPECT_TRUE(read(file("a.etree")) == read(shared("peanut.etree")));
+}
+
+TEST_F(Cli, BakePrintsJson) {
+    const Outcome o = run({"bake", file("cube.obj", obj_text(cube())), "-o", file("cube.etree"), "--levels", "1",
+                           "--quality", "fast", "--json"});
+    ASSERT_EQ(o.code, 0) << o.err;
+    const Json report = Json::parse(o.out);
+    EXPECT_EQ(report["diagnosis"]["input_triangles"], 12);
+    EXPECT_NEAR(report["solid_volume"].get<double>(), 8, 0.5);
+    EXPECT_EQ(listing(), (std::vector<std::string>{"cube.etree", "cube.obj"}));
+}
+
+TEST_F(Cli, OneTriangleIsALegalOpenMesh) {
+    const Outcome o = run({"bake", file("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "-o", file("one.etree"),
+                           "--levels", "1", "--quality", "fast"});
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_NE(o.err.find("3 open edges: no inside can be promised, baked in surface mode"), std::string::npos) << o.err;
+    EXPECT_EQ(run({"verify", file("one.etree"), file("one.obj")}).code, 0);
+    EXPECT_NE(run({"info", file("one.etree")}).out.find("surface mode"), std::string::npos);
+}
+
+TEST_F(Cli, BadMeshesAreRefused) {
+    const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    expect_bake_fails(file("missing.obj"), 4, "No such file");
+    fs::create_directory(folder_ / "folder.obj");
+    expect_bake_fails(file("folder.obj"), 4, "directory");
+    expect_bake_fails(file("empty.obj", ""), 3, "empty");
+    expect_bake_fails(file("short.obj", vertices + "f 1 2"), 3, "line 4");
+    expect_bake_fails(file("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), 3, "line 1");
+    expect_bake_fails(file("none.obj", vertices), 3, "no triangles");
+    expect_bake_fails(file("range.obj", vertices + "f 1 2 4\n"), 3, "does not exist");
+    expect_bake_fails(file("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), 3, "no triangle with an area");
+    expect_bake_fails(file("mesh.xyz", vertices), 3, "unknown kind");
+    expect_bake_fails(file("rubbish.glb", "rubbish"), 3, "");
+    // Not a number where only clean() can see it: binary STL.
+    std::string stl(84 + 50, '\0');
+    stl[80] = 1;
+    const float corners[9] = {0, 0, 0, 1, 0, 0, 0, std::nanf(""), 0};
+    std::copy_n(reinterpret_cast<const char*>(corners), sizeof corners, stl.begin() + 84 + 12);
+    expect_bake_fails(file("nan.stl", stl), 3, "not finite (index ");
+}
+
+TEST_F(Cli, WrongUsageIsOneLineWithAHint) {
+    const std::string mesh = shared("peanut.obj"), out = file("out.etree");
+    const auto bake_with = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"bake", mesh, "-o", out});
+        return run(more);
+    };
+    expect_failure(run({}), 2, "usage", "no command");
+    expect_failure(run({"bkae", mesh}), 2, "bkae", "did you mean 'bake'?");
+    expect_failure(run({"frobnicate"}), 2, "frobnicate", "prolate --help");
+    expect_failure(run({"bake", mesh}), 2, "bake", "--output");
+    expect_failure(run({"bake", mesh, "--ouput", out}), 2, "--ouput", "did you mean '--output'?");
+    expect_failure(bake_with({"--levles=3"}), 2, "--levles", "did you mean '--levels'?");
+    expect_failure(bake_with({"surplus"}), 2, "bake", "surplus");
+    expect_failure(bake_with({"--degree", "many"}), 2, "bake", "degree");
+    expect_failure(bake_with({"--degree", "1"}), 2, "bake", "degree must be 2 to 64");
+    expect_failure(bake_with({"--degree", "-4"}), 2, "bake", "degree");
+    expect_failure(bake_with({"--levels", "0"}), 2, "--levels", "1 to 31");
+    expect_failure(bake_with({"--levels", "32"}), 2, "bake", "1 to 31");
+    expect_failure(bake_with({"--ellipsoids", "0"}), 2, "--ellipsoids", "1 to 65536");
+    expect_failure(bake_with({"--ellipsoids", "65537"}), 2, "bake", "1 to 65536");
+    expect_failure(bake_with({"--tolerance", "0"}), 2, "--tolerance", "above 0");
+    expect_failure(bake_with({"--tolerance", "nan"}), 2, "bake", "tolerance");
+    expect_failure(bake_with({"--levels", "2", "--tolerance", "0.1"}), 2, "bake", "only one");
+    expect_failure(bake_with({"--alpha", "-1"}), 2, "bake", "alpha");
+    expect_failure(bake_with({"--quality", "superb"}), 2, "--quality", "fast, normal or best");
+    expect_failure(bake_with({"--method", "guess"}), 2, "--method", "no such method");
+    expect_failure(bake_with({"--primitive", "torus"}), 2, "--primitive", "no such primitive");
+    expect_failure(bake_with({"--report", out}), 2, out, "two files");
+    expect_failure(run({"bake", mesh, "-o", mesh}), 2, mesh, "the input itself");
+    EXPECT_TRUE(listing().empty());
+}
+
+TEST_F(Cli, WhatThisVersionLacksIsRefusedByName) {
+    const std::string mesh = shared("peanut.obj"), out = file("out.etree");
+    expect_failure(run({"bake", mesh, "-o", out, "--method", "analytic"}), 2, "--method analytic", "this version");
+    expect_failure(run({"bake", mesh, "-o", out, "--primitive", "sphere"}), 2, "--primitive sphere", "this version");
+    expect_failure(run({"bake", mesh, "-o", out, "--exact"}), 2, "--exact", "this version");
+    for (const char* format : {"glb", "pov", "obj"})
+        expect_failure(run({"export", shared("peanut.etree"), "-o", file(std::string("out.") + format)}), 2, format,
+                       "does not export");
+    EXPECT_TRUE(listing().empty());
+}
+
+// ---- writing ----
+
+TEST_F(Cli, AMissingFolderIsFoundBeforeTheWork) {
+    const std::string out = file("nowhere/out.etree");
+    expect_failure(run({"bake", file("missing.obj"), "-o", out}), 4, out, "does not exist");
+    expect_failure(run({"bake", shared("peanut.obj"), "-o", file("a.etree"), "--report", out}), 4, out,
+                   "does not exist");
+    expect_failure(run({"export", shared("peanut.etree"), "-o", file("nowhere/a.csv")}), 4, file("nowhere/a.csv"),
+                   "does not exist");
+    expect_failure(run({"bake", shared("peanut.obj"), "-o", folder_.string()}), 4, folder_.string(), "directory");
+    EXPECT_TRUE(listing().empty());
+}
+
+TEST_F(Cli, NoSpaceLeft) {
+    const std::string tree = shared("peanut.etree");
+    expect_failure(run({"export", tree, "-o", "/dev/full", "--format", "csv"}), 4, "/dev/full", "No space left");
+    RunOptions full;
+    full.stdout_path = "/dev/full";
+    expect_failure(run({"info", tree}, full), 4, "standard output", "No space left");
+    expect_failure(run({"export", tree, "-o", "-", "--format", "csv"}, full), 4, "standard output", "No space left");
+    expect_failure(run({"--help"}, full), 4, "standard output", "No space left");
+
+    RunOptions limited;
+    limited.in_child = [] {
+        const rlimit limit{1024, 1024};
+        ::setrlimit(RLIMIT_FSIZE, &limit);
+    };
+    const std::string old = file("out.csv", "old content");
+    expect_failure(run({"export", tree, "-o", old}, limited), 4, old, "File too large");
+    EXPECT_EQ(read(old), "old content");
+    expect_failure(run({"export", tree, "-o", file("new.csv")}, limited), 4, file("new.csv"), "File too large");
+    EXPECT_EQ(listing(), std::vector<std::string>{"out.csv"}) << "no part and no temporary file is left";
+}
+
+TEST_F(Cli, CtrlCLeavesTheOldFile) {
+    const std::string mesh = file("large.obj", obj_text(peanut(60))), out = file("out.etree", "old content");
+    RunOptions interrupt;
+    interrupt.interrupt = true;
+    const Outcome o = run({"bake", mesh, "-o", out, "--quality", "best", "--ellipsoids", "5000"}, interrupt);
+    expect_failure(o, 130, mesh, "interrupted");
+    EXPECT_EQ(read(out), "old content");
+    EXPECT_EQ(listing(), (std::vector<std::string>{"large.obj", "out.etree"}));
+}
+
+TEST_F(Cli, LinksGoOnPointingAtTheirFile) {
+    const std::string target = file("target.csv", "old");
+    fs::create_symlink(target, folder_ / "link.csv");
+    EXPECT_EQ(run({"export", shared("peanut.etree"), "-o", file("link.csv")}).code, 0);
+    EXPECT_TRUE(fs::is_symlink(folder_ / "link.csv"));
+    EXPECT_TRUE(read(target).starts_with("level,"));
+}
+
+// ---- reading trees ----
+
+TEST_F(Cli, BadTreesAreRefusedByEveryCommand) {
+    const std::string good = read(shared("peanut.etree"));
+    std::string newer = good, broken = good;
+    newer[8] = 99;
+    broken[broken.size() - 20] ^= 1;
+    fs::create_directory(folder_ / "folder.etree");
+    const struct {
+        std::string path;
+        int code;
+        const char* words;
+    } cases[] = {{file("missing.etree"), 4, "No such file"},
+                 {file("folder.etree"), 4, "directory"},
+                 {file("empty.etree", ""), 3, "empty"},
+                 {file("foreign.etree", "this is not a tree"), 3, "not an .etree"},
+                 {file("newer.etree", newer), 3, "newer format version than this library reads (version 99)"},
+                 {file("broken.etree", broken), 3, "prolate bake"},
+                 {file("cut.etree", good.substr(0, good.size() - 1)), 3, "prolate bake"}};
+    const auto before = listing();
+    for (const auto& c : cases) {
+        SCOPED_TRACE(c.path);
+        expect_failure(run({"info", c.path}), c.code, c.path, c.words);
+        expect_failure(run({"verify", c.path, shared("peanut.obj")}), c.code, c.path, c.words);
+        expect_failure(run({"export", c.path, "-o", file("out.csv")}), c.code, c.path, c.words);
+        expect_failure(run({"collide", shared("peanut.etree"), c.path}), c.code, c.path, c.words);
+    }
+    EXPECT_EQ(listing(), before);
+}
+
+TEST_F(Cli, InfoTellsWhatIsThere) {
+    const Outcome text = run({"info", shared("peanut.etree")});
+    EXPECT_EQ(text.code, 0);
+    EXPECT_NE(text.out.find("in 3 levels, degree 4"), std::string::npos) << text.out;
+    const Json info = Json::parse(run({"info", shared("peanut.etree"), "--json"}).out);
+    EXPECT_EQ(info["bytes"], fs::file_size(shared("peanut.etree")));
+    EXPECT_EQ(info["asked"]["levels"], 2);
+    EXPECT_EQ(info["levels"][2]["end_byte"], info["bytes"]);
+    const Json report = Json::parse(read(shared("report.json")));
+    EXPECT_EQ(info["source_hash"], report["source_hash"]);
+    EXPECT_EQ(info["nodes"], report["nodes"]);
+
+    const std::string whole = read(shared("peanut.etree"));
+    const Outcome prefix = run({"info", file("prefix.etree", whole.substr(0, info["levels"][1]["end_byte"]))});
+    EXPECT_EQ(prefix.code, 0) << prefix.err;
+    EXPECT_NE(prefix.out.find("coarser tree"), std::string::npos) << prefix.out;
+}
+
+TEST_F(Cli, VerifySaysYesAndNo) {
+    const Outcome yes = run({"verify", shared("peanut.etree"), shared("peanut.obj")});
+    EXPECT_EQ(yes.code, 0) << yes.out;
+    EXPECT_EQ(yes.err, "");
+    EXPECT_NE(yes.out.find("level 2: covered"), std::string::npos) << yes.out;
+
+    Mesh moved = peanut(8);
+    for (Vec3& v : moved.vertices) v.x += 1;
+    const std::string other = file("moved.obj", obj_text(moved));
+    const Outcome no = run({"verify", shared("peanut.etree"), other});
+    EXPECT_EQ(no.code, 1);
+    EXPECT_NE(no.out.find("NOT covered"), std::string::npos) << no.out;
+    EXPECT_NE(no.err.find("baked from another mesh"), std::string::npos) << no.err;
+    const Outcome json = run({"verify", shared("peanut.etree"), other, "--json"});
+    EXPECT_EQ(json.code, 1);
+    const Json report = Json::parse(json.out);
+    EXPECT_FALSE(report["covered"]);
+    EXPECT_FALSE(report["baked_from_this_mesh"]);
+    EXPECT_EQ(report["levels"][0]["counterexample"].size(), 3u);
+    EXPECT_EQ(run({"verify", shared("peanut.etree"), file("missing.obj")}).code, 4);
+}
+
+// ---- export ----
+
+std::vector<std::vector<double>> parse_csv(const std::string& text) {
+    std::istringstream lines(text);
+    std::string line;
+    std::getline(lines, line);
+    EXPECT_EQ(line, "level,cx,cy,cz,r1,r2,r3,R11,R12,R13,R21,R22,R23,R31,R32,R33");
+    std::vector<std::vector<double>> rows;
+    while (std::getline(lines, line)) {
+        rows.emplace_back();
+        std::istringstream cells(line);
+        for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
+        EXPECT_EQ(rows.back().size(), 16u);
+    }
+    return rows;
+}
+
+TEST_F(Cli, CsvAgreesWithInfoAndCovers) {
+    const Json info = Json::parse(run({"info", shared("peanut.etree"), "--json"}).out);
+    const Outcome all = run({"export", shared("peanut.etree"), "-o", "-", "--format", "csv"});
+    ASSERT_EQ(all.code, 0) << all.err;
+    EXPECT_EQ(all.err, "");
+    std::map<double, size_t> counts;
+    for (const auto& row : parse_csv(all.out)) ++counts[row[0]];
+    ASSERT_EQ(counts.size(), info["levels"].size());
+    const Mesh mesh = peanut(8);
+    for (size_t l = 0; l < counts.size(); ++l) {
+        EXPECT_EQ(counts[static_cast<double>(l)], info["levels"][l]["nodes"]);
+        const std::string path = file("level" + std::to_string(l) + ".csv");
+        ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", path, "--level", std::to_string(l)}).code, 0);
+        const auto rows = parse_csv(read(path));
+        EXPECT_EQ(rows.size(), info["levels"][l]["cut"]);
+        // The columns mean what they say: every vertex of the mesh lies in an ellipsoid made from them.
+        for (const Vec3& v : mesh.vertices) {
+            double nearest = INFINITY;
+            for (const auto& row : rows) {
+                EXPECT_EQ(row[0], static_cast<double>(l));
+                const double d[3] = {v.x - row[1], v.y - row[2], v.z - row[3]};
+                double sum = 0;
+                for (size_t i = 0; i < 3; ++i)
+                    sum += std::pow((row[7 + i] * d[0] + row[10 + i] * d[1] + row[13 + i] * d[2]) / row[4 + i], 2);
+                nearest = std::min(nearest, sum);
+            }
+            EXPECT_LE(nearest, 1 + 1e-9);
+        }
+    }
+    expect_failure(run({"export", shared("peanut.etree"), "-o", file("x.csv"), "--level", "3"}), 2, "--level",
+                   "no level 3");
+}
+
+TEST_F(Cli, ExportsJsonAndPly) {
+    const Json info = Json::parse(run({"info", shared("peanut.etree"), "--json"}).out);
+    ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("a.json")}).code, 0);
+    const Json json = Json::parse(read(file("a.json")));
+    EXPECT_EQ(json["nodes"].size(), info["nodes"]);
+    EXPECT_EQ(json["nodes"][0]["factor"].size(), 6u);
+
+    ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("a.PLY"), "--level", "1"}).code, 0);
+    const auto mesh = load_mesh(file("a.PLY").c_str());
+    ASSERT_TRUE(mesh) << mesh.error().what;
+    const auto cleaned = clean(mesh->view());
+    ASSERT_TRUE(cleaned);
+    EXPECT_TRUE(cleaned->report.closed);
+    EXPECT_EQ(mesh->triangles.size(), 512u * info["levels"][1]["cut"].get<size_t>());
+    const std::string bytes = read(file("a.PLY"));
+    EXPECT_NE(bytes.find("property uchar red"), std::string::npos);
+
+    expect_failure(run({"export", shared("peanut.etree"), "-o", file("noname")}), 2, file("noname"), "--format");
+    expect_failure(run({"export", shared("peanut.etree"), "-o", "-"}), 2, "-", "--format");
+    expect_failure(run({"export", shared("peanut.etree"), "-o", file("a.doc")}), 2, "doc", "no such export format");
+}
+
+// ---- collide ----
+
+TEST_F(Cli, CollideAnswersForBothVerdicts) {
+    const std::string tree = shared("peanut.etree");
+    const Outcome apart = run({"collide", tree, tree, "--pose", "0,0,-9"});
+    EXPECT_EQ(apart.code, 0) << apart.err;
+    EXPECT_TRUE(apart.out.starts_with("separated\n")) << apart.out;
+    const Outcome meeting = run({"collide", tree, tree, "--pose", "-0.5,0,0,0,0,0.7071,0.7071", "--json"});
+    EXPECT_EQ(meeting.code, 0) << meeting.err;
+    const Json json = Json::parse(meeting.out);
+    EXPECT_EQ(json["verdict"], "overlapping");
+    EXPECT_TRUE(json["node_a"].is_number() && json["node_b"].is_number());
+    EXPECT_GT(json["pair_tests"], 0);
+    // The rotation counts: two long bodies side by side, and one of them turned by a right angle about z.
+    EXPECT_TRUE(run({"collide", tree, tree, "--pose", "0,2.2,0"}).out.starts_with("separated"));
+    EXPECT_TRUE(run({"collide", tree, tree, "--pose", "0,2.2,0,0,0,1,1"}).out.starts_with("overlapping"));
+    EXPECT_TRUE(run({"collide", tree, tree, "--budget", "0"}).out.starts_with("undecided"));
+    EXPECT_EQ(Json::parse(run({"collide", tree, tree, "--level", "0", "--json"}).out)["deepest_level"], 0);
+}
+
+TEST_F(Cli, CollideRefusesBadPoses) {
+    const std::string tree = shared("peanut.etree");
+    for (const char* pose : {"", "1,2", "1,2,3,4", "1,2,3,0,0,0,0", "1,2,nan", "1,2,3,", "1,2,x", "1 2 3",
+                             "1,2,3,0,0,0,1,5", "1,2,1e99"}) {
+        SCOPED_TRACE(pose);
+        expect_failure(run({"collide", tree, tree, "--pose=" + std::string(pose)}), 2, *pose ? "--pose" : "collide",
+                       "");
+    }
+}
+
+// ---- help ----
+
+TEST_F(Cli, HelpTeachesWithExamples) {
+    const Outcome help = run({"--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("Exit codes"), std::string::npos);
+    for (const char* command : {"bake", "info", "verify", "export", "collide", "render"}) {
+        EXPECT_NE(help.out.find(command), std::string::npos);
+        const Outcome one = run({command, "--help"});
+        EXPECT_EQ(one.code, 0);
+        EXPECT_NE(one.out.find(std::string("prolate ") + command), std::string::npos) << one.out;
+    }
+    const Outcome version = run({"--version"});
+    EXPECT_EQ(version.code, 0);
+    EXPECT_TRUE(version.out.starts_with("prolate ")) << version.out;
+}
+
+} // namespace
+} // namespace prolate
