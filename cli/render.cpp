@@ -6,18 +6,20 @@
 
 #include <algorithm>
 #include <charconv>
-#include <map>
+#include <iterator>
 #include <memory>
 
 namespace prolate::cli {
 namespace {
+
+constexpr const char* kAxes[] = {"x", "y", "z", "-x", "-y", "-z"}; // in the order of UpAxis
 
 struct RenderArguments {
     std::string tree, mesh, output;
     std::string size = "1600x1200";
     std::vector<double> view = {View{}.azimuth, View{}.elevation};
     std::vector<uint32_t> levels;
-    UpAxis up = UpAxis::y;
+    std::string up = "y";
     bool no_shadow = false;
     uint32_t samples = SheetOptions{}.samples, threads = 0;
 };
@@ -56,7 +58,8 @@ int run(const RenderArguments& a) {
     if (options.levels.empty())
         for (uint32_t level = std::min(1u, view.level_count() - 1); level < std::min(4u, view.level_count()); ++level)
             options.levels.push_back(level);
-    options.view = {a.view[0], a.view[1], a.up};
+    const auto axis = std::find(std::begin(kAxes), std::end(kAxes), a.up) - std::begin(kAxes);
+    options.view = {a.view[0], a.view[1], static_cast<UpAxis>(axis)};
     options.samples = a.samples;
     options.threads = a.threads;
     options.floor_shadow = !a.no_shadow;
@@ -81,15 +84,14 @@ void add_render(CLI::App& app, Work& chosen) {
     command->add_option("-o,--output", a->output, "the PNG file to write, or - for standard output")->required();
     command->add_option("--size", a->size, "width and height of the picture, pixels")->capture_default_str();
     command->add_option("--levels", a->levels, "levels to show, as 0,1,2 (default: 1, 2 and 3, as far as they exist)")
-        ->delimiter(',');
+        ->delimiter(',')
+        ->allow_extra_args(false); // or it would swallow the file names that follow
     command->add_option("--view", a->view, "where the viewer stands: azimuth and elevation, degrees (default: 30,18)")
         ->delimiter(',')
         ->expected(2);
-    static const std::map<std::string, UpAxis> kAxes = {{"x", UpAxis::x},        {"y", UpAxis::y},
-                                                        {"z", UpAxis::z},        {"-x", UpAxis::minus_x},
-                                                        {"-y", UpAxis::minus_y}, {"-z", UpAxis::minus_z}};
-    command->add_option("--up", a->up, "the model's axis that points up: x, y, z, -x, -y or -z (default: y)")
-        ->transform(CLI::CheckedTransformer(kAxes));
+    command->add_option("--up", a->up, "the model's axis that points up")
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kAxes), std::end(kAxes))))
+        ->capture_default_str();
     command->add_option("--samples", a->samples, "light samples a pixel, 16 ... 1024")->capture_default_str();
     command->add_option("--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--no-shadow", a->no_shadow, "leave out the shadow on the floor");
