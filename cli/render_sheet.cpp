@@ -44,7 +44,7 @@ Layout choose_layout(uint32_t panels, const SheetOptions& o, const Window& shown
         l.cell_width = o.width / l.columns;
         l.cell_height = o.height / l.rows;
         if (std::min(l.cell_width, l.cell_height) < kSmallestCell) continue;
-        l.text = std::clamp(std::min(l.cell_width / 26, l.cell_height / 22), 8u, 64u);
+        l.text = std::clamp(std::min(l.cell_width / 23, l.cell_height / 22), 8u, 64u);
         l.caption = l.text * 2 + 4;
         l.scale = std::min(l.cell_width / (shown.u1 - shown.u0), (l.cell_height - l.caption) / (shown.v1 - shown.v0));
         // No more height than the picture needs, so that its caption stays near.
