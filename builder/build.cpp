@@ -33,21 +33,24 @@ struct Effort {
 
 Effort effort_of(Quality quality) {
     switch (quality) {
-    case Quality::fast: return {64, 4, 12};
-    case Quality::normal: return {96, 10, 32};
-    case Quality::best: return {128, 20, 80};
+    case Quality::fast:
+        return {64, 4, 12};
+    case Quality::normal:
+        return {96, 10, 32};
+    case Quality::best:
+        return {128, 20, 80};
     }
     return {96, 10, 32};
 }
 
 constexpr uint32_t kMaxResolution = 320;
-constexpr double kCellsPerLeaf = 40;       // fewer, and leaves follow the grid instead of the shape
-constexpr uint32_t kSamplesPerCell = 2;    // surface samples, on average over all cells
-constexpr int kMeasureColumns = 512;       // of the reported figures
-constexpr double kSmallestRadius = 1e-5;   // of the diagonal
+constexpr double kCellsPerLeaf = 40;     // fewer, and leaves follow the grid instead of the shape
+constexpr uint32_t kSamplesPerCell = 2;  // surface samples, on average over all cells
+constexpr int kMeasureColumns = 512;     // of the reported figures
+constexpr double kSmallestRadius = 1e-5; // of the diagonal
 
-// A solid that fills less than this share of its box has no inside worth the name.
-constexpr double kNoInside = 1e-6;
+// A solid of less than this share of its diagonal's cube has no inside worth the name.
+constexpr double kNoInside = 1e-12;
 
 // One build, start to end. Members are in the order in which they come to life.
 class Bake {
@@ -65,10 +68,12 @@ public:
 
         const Winding winding(mesh_);
         const Voxels voxels = voxelise(winding);
-        has_inside_ = voxels.solid_volume() > kNoInside * box_.size().prod();
-        if (options_.tolerance > 0 && !has_inside_)
-            return Error{ErrorCode::bad_mesh, "the mesh encloses no volume, so no outside ratio can be met; "
-                                              "give levels or a count instead of a tolerance", 0};
+        measure_solid(winding);
+        if (options_.tolerance > 0 && solid_volume_ == 0)
+            return Error{ErrorCode::bad_mesh,
+                         "the mesh encloses no volume, so no outside ratio can be met; "
+                         "give levels or a count instead of a tolerance",
+                         0};
         if (!report("split", 0.05, 1)) return stopped();
 
         const Grown grown = grow_tree(voxels, winding);
@@ -77,21 +82,20 @@ public:
         std::vector<format::PackedLevel> levels;
         if (auto packed = pack(grown, voxels, levels); !packed) return packed.error();
         if (!report("measure", 0.8, static_cast<uint32_t>(grown.nodes.size()))) return stopped();
-        BakeInfo info = describe(voxels);
+        const BakeInfo info = describe();
         // Measured on decoded nodes, so that the figures are the file's; they are then written into its levels table.
         std::vector<LevelReport> figures;
         {
             auto draft = Tree::open(format::encode(info, options_.degree, lattice_, levels));
             if (!draft) return draft.error();
             figures = measure(draft->view(), grown, winding, levels);
-            info.solid_volume = solid_volume_;
         }
         auto tree = Tree::open(format::encode(info, options_.degree, lattice_, levels));
         if (!tree) return tree.error();
 
         if (auto proved = prove(tree->view(), figures); !proved) return proved.error();
-        Build build{std::move(*tree), cleaned->report, std::move(figures), solid_volume_, box_.size().norm(), resolution_,
-                    !closed_, grown.goal_reached, seconds_since(start)};
+        Build build{std::move(*tree), cleaned->report, std::move(figures), solid_volume_,       box_.size().norm(),
+                    resolution_,      !closed_,        grown.goal_reached, seconds_since(start)};
         return build;
     }
 
@@ -110,6 +114,15 @@ private:
         if (options_.ellipsoids) return options_.ellipsoids;
         if (options_.tolerance > 0) return 1000;
         return std::min(std::pow(double(options_.degree), options_.levels ? options_.levels : 3u), 65536.0);
+    }
+
+    void measure_solid(const Winding& winding) {
+        const Vec step = box_.size() / kMeasureColumns;
+        const Columns columns(mesh_, closed_, winding,
+                              {box_.low.x() + 0.41421356 * step.x(), box_.low.y() + 0.73205081 * step.y(), step.x(),
+                               step.y(), kMeasureColumns, kMeasureColumns});
+        const double volume = columns.volume();
+        solid_volume_ = volume > kNoInside * std::pow(box_.size().norm(), 3) ? volume : 0;
     }
 
     Voxels voxelise(const Winding& winding) {
@@ -132,8 +145,12 @@ private:
     Grown grow_tree(const Voxels& voxels, const Winding& winding) {
         GrowOptions options;
         options.build = options_;
-        options.split = {{options_.alpha, options_.beta}, kSmallestRadius * box_.size().norm(), effort_.sweeps,
-                         effort_.trials, options_.seed, &cancelled_};
+        options.split = {{options_.alpha, options_.beta},
+                         kSmallestRadius * box_.size().norm(),
+                         effort_.sweeps,
+                         effort_.trials,
+                         options_.seed,
+                         &cancelled_};
         options.outside_ratio = [&](const std::vector<Fit>& fits) {
             std::vector<Ellipsoid> ellipsoids;
             for (const Fit& fit : fits) {
@@ -141,8 +158,7 @@ private:
                 const Eigen::Vector3f c = fit.center.cast<float>();
                 ellipsoids.push_back({{c.x(), c.y(), c.z()}, l(0, 0), l(1, 0), l(1, 1), l(2, 0), l(2, 1), l(2, 2)});
             }
-            const CoverVolume volume = measure_cover(mesh_, closed_, winding, ellipsoids, kMeasureColumns / 2);
-            return volume.outside / volume.solid;
+            return measure_cover(mesh_, closed_, winding, ellipsoids, kMeasureColumns / 2).outside / solid_volume_;
         };
         options.progress = [&](double done, uint32_t nodes) { return report("split", 0.05 + 0.75 * done, nodes); };
         return grow(voxels, options);
@@ -161,8 +177,10 @@ private:
                 const GrownNode& node = grown.nodes[index];
                 auto packed = covering_node(node.cluster.fit, voxels, node.cluster.cells, lattice_);
                 if (!packed)
-                    return Error{ErrorCode::bad_mesh, "the mesh is too large or too small for the file format; "
-                                                      "scale it to metres", index};
+                    return Error{ErrorCode::bad_mesh,
+                                 "the mesh is too large or too small for the file format; "
+                                 "scale it to metres",
+                                 index};
                 packed->child_count = static_cast<uint8_t>(node.child_count);
                 level.nodes.push_back(*packed);
                 for (uint32_t c = 0; c < node.child_count; ++c) next.push_back(node.first_child + c);
@@ -172,12 +190,12 @@ private:
         return {};
     }
 
-    BakeInfo describe(const Voxels& voxels) const {
+    BakeInfo describe() const {
         BakeInfo info;
         info.source_hash = hash(mesh_);
         info.options_hash = hash(options_);
         info.surface_mode = !closed_;
-        info.solid_volume = has_inside_ ? voxels.solid_volume() : 0;
+        info.solid_volume = solid_volume_;
         info.method = options_.method;
         info.primitive = options_.primitive;
         info.quality = options_.quality;
@@ -200,7 +218,6 @@ private:
             std::vector<Ellipsoid> cut;
             tree.for_each_in_cut(l, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
             const CoverVolume volume = measure_cover(mesh_, closed_, winding, cut, kMeasureColumns);
-            if (l == 0) solid_volume_ = has_inside_ ? volume.solid : 0;
             LevelReport figure;
             double outside = 0;
             for (const GrownNode& node : grown.nodes)
@@ -211,8 +228,8 @@ private:
             figure.nodes = static_cast<uint32_t>(cut.size());
             figure.bytes = tree.level(l).end_byte;
             figure.union_volume = volume.whole;
-            figure.outside_ratio = has_inside_ ? volume.outside / volume.solid : kUnknown;
-            figure.sum_outside_ratio = has_inside_ ? outside / volume.solid : kUnknown;
+            figure.outside_ratio = solid_volume_ > 0 ? volume.outside / solid_volume_ : kUnknown;
+            figure.sum_outside_ratio = solid_volume_ > 0 ? outside / solid_volume_ : kUnknown;
             figure.seconds = seconds_since(start) + (l < grown.seconds.size() ? grown.seconds[l] : 0);
             levels[l].outside_ratio = static_cast<float>(figure.outside_ratio);
             levels[l].surface_error = static_cast<float>(figure.surface_error);
@@ -236,7 +253,8 @@ private:
             figures[l].seconds += seconds_since(start) * static_cast<double>(proof->levels[l].pieces) /
                                   static_cast<double>(std::max<uint64_t>(pieces, 1));
             if (!figures[l].covered)
-                return Error{ErrorCode::internal, "the cover of a level could not be proved; please report this mesh", l};
+                return Error{ErrorCode::internal, "the cover of a level could not be proved; please report this mesh",
+                             l};
         }
         return {};
     }
@@ -252,8 +270,7 @@ private:
     bool closed_ = false;
     Box box_;
     uint32_t resolution_ = 0;
-    bool has_inside_ = false;
-    double solid_volume_ = 0;
+    double solid_volume_ = 0; // 0 where there is no inside
     format::Lattice lattice_;
 };
 

@@ -36,15 +36,15 @@ std::pair<int, int> index_range(double low, double high, double x0, double pitch
 template <class Visit> void for_each_crossing(MeshView mesh, const ColumnLattice& lattice, Visit&& visit) {
     for (const Triangle& t : mesh.triangles) {
         const Vec a = to_vec(mesh.vertices[t[0]]), b = to_vec(mesh.vertices[t[1]]), c = to_vec(mesh.vertices[t[2]]);
-        const auto [i0, i1] = index_range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}),
-                                          lattice.x0, lattice.pitch, lattice.nx);
-        const auto [j0, j1] = index_range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}),
-                                          lattice.y0, lattice.pitch, lattice.ny);
+        const auto [i0, i1] = index_range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), lattice.x0,
+                                          lattice.dx, lattice.nx);
+        const auto [j0, j1] = index_range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), lattice.y0,
+                                          lattice.dy, lattice.ny);
         const double area = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
         const double z_low = std::min({a.z(), b.z(), c.z()}), z_high = std::max({a.z(), b.z(), c.z()});
         for (int i = i0; i <= i1; ++i)
             for (int j = j0; j <= j1; ++j) {
-                const double x = lattice.x0 + i * lattice.pitch, y = lattice.y0 + j * lattice.pitch;
+                const double x = lattice.x0 + i * lattice.dx, y = lattice.y0 + j * lattice.dy;
                 const int s = side(a, b, x, y);
                 if (side(b, c, x, y) != s || side(c, a, x, y) != s) continue;
                 double z = z_low;
@@ -62,8 +62,7 @@ template <class Visit> void for_each_crossing(MeshView mesh, const ColumnLattice
 
 } // namespace
 
-Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const ColumnLattice& lattice)
-    : lattice_(lattice) {
+Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const ColumnLattice& lattice) : lattice_(lattice) {
     // Crossings of all columns, in one array, by counting first.
     const size_t count = static_cast<size_t>(lattice.nx) * static_cast<size_t>(lattice.ny);
     std::vector<size_t> crossing_begin(count + 1, 0);
@@ -82,9 +81,8 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
             const size_t c = static_cast<size_t>(i) * static_cast<size_t>(lattice.ny) + static_cast<size_t>(j);
             const std::span<Crossing> own(crossings.data() + crossing_begin[c],
                                           crossing_begin[c + 1] - crossing_begin[c]);
-            std::sort(own.begin(), own.end(), [](const Crossing& s, const Crossing& t) {
-                return s.z != t.z ? s.z < t.z : s.sign > t.sign;
-            });
+            std::sort(own.begin(), own.end(),
+                      [](const Crossing& s, const Crossing& t) { return s.z != t.z ? s.z < t.z : s.sign > t.sign; });
             const size_t first = row.size();
             // Signs that do not add up (an open mesh; a column within rounding of a vertex) cannot be counted.
             int depth = 0;
@@ -96,7 +94,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
                 if (!(low < high)) continue;
                 bool solid = depth != 0;
                 if (!countable) {
-                    const Vec middle(lattice.x0 + i * lattice.pitch, lattice.y0 + j * lattice.pitch, 0.5 * (low + high));
+                    const Vec middle(lattice.x0 + i * lattice.dx, lattice.y0 + j * lattice.dy, 0.5 * (low + high));
                     solid = std::abs(winding(middle)) >= 0.5;
                 }
                 if (!solid) continue;
@@ -117,7 +115,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
 double Columns::volume() const {
     double length = 0;
     for (const Interval& s : intervals_) length += s.high - s.low;
-    return length * lattice_.pitch * lattice_.pitch;
+    return length * lattice_.dx * lattice_.dy;
 }
 
 CoverVolume measure_cover(MeshView mesh, bool closed, const Winding& winding, std::span<const Ellipsoid> ellipsoids,
@@ -141,32 +139,30 @@ CoverVolume measure_cover(MeshView mesh, bool closed, const Winding& winding, st
         box.add(c + half);
     }
     for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
-    const double pitch = std::max(box.size().x(), box.size().y()) / columns_across;
-    if (!(pitch > 0)) return {};
+    const double dx = box.size().x() / columns_across, dy = box.size().y() / columns_across;
     // An irrational offset: no column of a mesh modelled on round numbers falls on its edges.
-    const ColumnLattice lattice{box.low.x() + 0.41421356 * pitch, box.low.y() + 0.73205081 * pitch, pitch,
-                                static_cast<int>(box.size().x() / pitch) + 1,
-                                static_cast<int>(box.size().y() / pitch) + 1};
+    const ColumnLattice lattice{
+        box.low.x() + 0.41421356 * dx, box.low.y() + 0.73205081 * dy, dx, dy, columns_across, columns_across};
     const Columns solid(mesh, closed, winding, lattice);
 
     std::vector<std::vector<uint32_t>> by_row(static_cast<size_t>(lattice.nx));
     for (uint32_t s = 0; s < shapes.size(); ++s) {
-        const auto [i0, i1] = index_range(shapes[s].c.x() - shapes[s].ex, shapes[s].c.x() + shapes[s].ex, lattice.x0,
-                                          pitch, lattice.nx);
+        const auto [i0, i1] =
+            index_range(shapes[s].c.x() - shapes[s].ex, shapes[s].c.x() + shapes[s].ex, lattice.x0, dx, lattice.nx);
         for (int i = i0; i <= i1; ++i) by_row[static_cast<size_t>(i)].push_back(s);
     }
     std::vector<CoverVolume> rows(static_cast<size_t>(lattice.nx));
     tbb::parallel_for(0, lattice.nx, [&](int i) {
-        const double x = lattice.x0 + i * pitch;
+        const double x = lattice.x0 + i * dx;
         std::vector<std::vector<Interval>> cover(static_cast<size_t>(lattice.ny));
         for (const uint32_t s : by_row[static_cast<size_t>(i)]) {
             const Shape& shape = shapes[s];
             const auto [j0, j1] =
-                index_range(shape.c.y() - shape.ey, shape.c.y() + shape.ey, lattice.y0, pitch, lattice.ny);
+                index_range(shape.c.y() - shape.ey, shape.c.y() + shape.ey, lattice.y0, dy, lattice.ny);
             for (int j = j0; j <= j1; ++j) {
                 // |w + z u|^2 = 1 with u = the z-column of L^-1, w = the rest.
                 const Vec w = shape.inverse.col(0) * (x - shape.c.x()) +
-                              shape.inverse.col(1) * (lattice.y0 + j * pitch - shape.c.y());
+                              shape.inverse.col(1) * (lattice.y0 + j * dy - shape.c.y());
                 const Vec u = shape.inverse.col(2);
                 const double uu = u.squaredNorm(), uw = u.dot(w), discriminant = uw * uw - uu * (w.squaredNorm() - 1);
                 if (discriminant <= 0) continue;
@@ -194,9 +190,9 @@ CoverVolume measure_cover(MeshView mesh, bool closed, const Winding& winding, st
     });
     CoverVolume total;
     for (const CoverVolume& row : rows) { // in order: the same sum for any number of threads
-        total.solid += row.solid * pitch * pitch;
-        total.whole += row.whole * pitch * pitch;
-        total.outside += row.outside * pitch * pitch;
+        total.solid += row.solid * dx * dy;
+        total.whole += row.whole * dx * dy;
+        total.outside += row.outside * dx * dy;
     }
     return total;
 }

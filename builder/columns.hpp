@@ -19,9 +19,9 @@ struct Interval {
     double low, high;
 };
 
-/// Columns at (x0 + i * pitch, y0 + j * pitch), 0 <= i < nx, 0 <= j < ny.
+/// Columns at (x0 + i * dx, y0 + j * dy), 0 <= i < nx, 0 <= j < ny.
 struct ColumnLattice {
-    double x0, y0, pitch;
+    double x0, y0, dx, dy;
     int nx, ny;
 };
 
@@ -53,8 +53,8 @@ struct CoverVolume {
     double outside = 0; ///< of the union less the solid
 };
 
-/// Measures the union of `ellipsoids` against the solid on columns about `columns_across` along the longer side of all
-/// of it, at a lattice of its own, so that figures are not read off the grid that was optimised.
+/// Measures the union of `ellipsoids` against the solid on columns_across x columns_across columns over all of it: a
+/// lattice of its own, so that figures are not read off the grid that was optimised.
 CoverVolume measure_cover(MeshView mesh, bool closed, const Winding& winding, std::span<const Ellipsoid> ellipsoids,
                           int columns_across);
 

@@ -15,8 +15,8 @@ namespace prolate {
 /// rounding of the clipped points by a wide margin and lets verify() end quickly.
 inline constexpr double kSlack = 0x1p-14;
 
-/// Quantises `fit` and enlarges it by the least that makes the decoded ellipsoid cover the points of `cells`. Cover does
-/// therefore not depend on how well the fit converged. Empty only if the format cannot hold the size.
+/// Quantises `fit` and enlarges it by the least that makes the decoded ellipsoid cover the points of `cells`. Cover
+/// does therefore not depend on how well the fit converged. Empty only if the format cannot hold the size.
 std::optional<format::PackedNode> covering_node(const Fit& fit, const Voxels& voxels, std::span<const uint32_t> cells,
                                                 const format::Lattice& lattice);
 

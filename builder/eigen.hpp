@@ -21,7 +21,9 @@ struct Box {
     void add(const Box& b) { low = low.cwiseMin(b.low), high = high.cwiseMax(b.high); }
     Vec center() const { return 0.5 * (low + high); }
     Vec size() const { return high - low; }
-    Vec corner(unsigned i) const { return {i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()}; }
+    Vec corner(unsigned i) const {
+        return {i & 1 ? high.x() : low.x(), i & 2 ? high.y() : low.y(), i & 4 ? high.z() : low.z()};
+    }
 };
 
 } // namespace prolate

@@ -57,9 +57,9 @@ std::vector<Vec> with_thickness(std::span<const Vec> points, double min_radius) 
     Vec middle = mean;
     for (size_t a = 0; a < 3; ++a) middle += 0.5 * (low[a] + high[a]) * axis[a];
     for (size_t a = 0; a < 3; ++a)
-        if (0.5 * (high[a] - low[a]) < 0.5 * thinnest) {
-            out.push_back(middle + 0.5 * thinnest * axis[a]);
-            out.push_back(middle - 0.5 * thinnest * axis[a]);
+        if (0.5 * (high[a] - low[a]) < thinnest) {
+            out.push_back(middle + thinnest * axis[a]);
+            out.push_back(middle - thinnest * axis[a]);
         }
     return out;
 }

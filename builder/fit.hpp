@@ -24,7 +24,14 @@ struct Fit {
     Fit(const Vec& c, const Mat& lower);
     explicit Fit(const Ellipsoid& e);
 
-    double radial_squared(const Vec& p) const { return (inverse.triangularView<Eigen::Lower>() * (p - center)).squaredNorm(); }
+    /// Squared radial coordinate |L^-1 (p - center)|^2: at most 1 inside.
+    double radial_squared(const Vec& p) const {
+        const Vec d = p - center;
+        const double y1 = inverse(0, 0) * d.x();
+        const double y2 = inverse(1, 0) * d.x() + inverse(1, 1) * d.y();
+        const double y3 = inverse(2, 0) * d.x() + inverse(2, 1) * d.y() + inverse(2, 2) * d.z();
+        return y1 * y1 + y2 * y2 + y3 * y3;
+    }
     double volume() const;
     /// Half extents of the bounding box.
     Vec half_extents() const { return factor.rowwise().norm(); }
@@ -34,8 +41,8 @@ struct Fit {
     double reach(std::span<const Vec> points) const;
 };
 
-/// Ellipsoid with the shape matrix `q` (symmetric positive definite), its axis ratio brought down to kMaxAxisRatio and its
-/// radii up to `min_radius` by lengthening short axes.
+/// Ellipsoid with the shape matrix `q` (symmetric positive definite), its axis ratio brought down to kMaxAxisRatio and
+/// its radii up to `min_radius` by lengthening short axes.
 Fit capped(const Vec& center, const Mat& q, double min_radius);
 
 /// Minimum-volume ellipsoid around `points` (any number above 0, also coplanar or equal ones), capped, to a relative

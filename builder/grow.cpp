@@ -9,6 +9,7 @@
 #include <chrono>
 #include <mutex>
 #include <numeric>
+#include <set>
 
 namespace prolate {
 namespace {
@@ -41,8 +42,9 @@ private:
     bool cancelled() const { return options_.split.cancelled->load(std::memory_order_relaxed); }
 
     // A leaf that splitting can make finer.
-    bool splittable(const GrownNode& node) const {
-        return node.child_count == 0 && node.level + 1 < kMaxLevels && node.cluster.cells.size() > 1;
+    bool splittable(uint32_t leaf) const {
+        const GrownNode& node = grown_.nodes[leaf];
+        return node.level + 1 < kMaxLevels && node.cluster.cells.size() > 1 && !exhausted_.contains(leaf);
     }
 
     std::vector<uint32_t> leaves() const {
@@ -62,10 +64,10 @@ private:
     }
 
     // Splits each node of `parents` into up to degrees[i] children; `share` maps the round's progress to the whole.
-    template <class Share> void split_all(const std::vector<uint32_t>& parents, const std::vector<uint32_t>& degrees,
-                                          Share&& share) {
+    template <class Share>
+    void split_all(const std::vector<uint32_t>& parents, const std::vector<uint32_t>& degrees, Share&& share) {
         const auto start = Clock::now();
-        std::vector<std::vector<Cluster>> children(parents.size());
+        std::vector<Split> children(parents.size());
         size_t done = 0, done_cells = 0, all_cells = 0;
         for (const uint32_t p : parents) all_cells += grown_.nodes[p].cluster.cells.size();
         auto made = static_cast<uint32_t>(grown_.nodes.size());
@@ -87,23 +89,28 @@ private:
                     own.seed = Random(own.seed + parents[i]).bits();
                     children[i] = split(voxels_, cells, degrees[i], own);
                     const std::lock_guard lock(reporting);
-                    ++done, done_cells += cells.size(), made += static_cast<uint32_t>(children[i].size());
+                    ++done, done_cells += cells.size(), made += static_cast<uint32_t>(children[i].clusters.size());
                     if (options_.progress)
-                        options_.progress(share(static_cast<double>(done_cells) / static_cast<double>(all_cells)), made);
+                        options_.progress(share(static_cast<double>(done_cells) / static_cast<double>(all_cells)),
+                                          made);
                 }
             },
             tbb::simple_partitioner());
         if (cancelled()) return;
         uint32_t deepest = 0;
         for (size_t i = 0; i < parents.size(); ++i) {
-            if (children[i].size() < 2) { // nothing gained: stays a leaf, and is not tried again
-                exhausted_.push_back(parents[i]);
+            // Nothing gained, as for a ball: stays a leaf and is not tried again - unless the count is all that
+            // matters.
+            const Split& split = children[i];
+            const bool gains = split.outside < grown_.nodes[parents[i]].outside || options_.build.ellipsoids > 0;
+            if (split.clusters.size() < 2 || !gains) {
+                exhausted_.insert(parents[i]);
                 continue;
             }
             const uint32_t level = grown_.nodes[parents[i]].level + 1;
             grown_.nodes[parents[i]].first_child = static_cast<uint32_t>(grown_.nodes.size());
-            grown_.nodes[parents[i]].child_count = static_cast<uint32_t>(children[i].size());
-            for (Cluster& child : children[i]) add(std::move(child), level);
+            grown_.nodes[parents[i]].child_count = static_cast<uint32_t>(split.clusters.size());
+            for (Cluster& child : children[i].clusters) add(std::move(child), level);
             deepest = std::max(deepest, level);
         }
         if (grown_.seconds.size() <= deepest) grown_.seconds.resize(deepest + 1);
@@ -114,9 +121,9 @@ private:
         for (uint32_t level = 0; level < levels && !cancelled(); ++level) {
             std::vector<uint32_t> parents;
             for (const uint32_t leaf : leaves())
-                if (grown_.nodes[leaf].level == level && splittable(grown_.nodes[leaf])) parents.push_back(leaf);
+                if (grown_.nodes[leaf].level == level && splittable(leaf)) parents.push_back(leaf);
             if (parents.empty()) {
-                grown_.goal_reached = false; // every leaf is down to one cell
+                grown_.goal_reached = false; // no leaf can be improved
                 return;
             }
             split_all(parents, std::vector<uint32_t>(parents.size(), options_.build.degree),
@@ -128,9 +135,7 @@ private:
     std::vector<uint32_t> worst_leaves() const {
         std::vector<uint32_t> out;
         for (const uint32_t leaf : leaves())
-            if (splittable(grown_.nodes[leaf]) &&
-                std::find(exhausted_.begin(), exhausted_.end(), leaf) == exhausted_.end())
-                out.push_back(leaf);
+            if (splittable(leaf)) out.push_back(leaf);
         std::stable_sort(out.begin(), out.end(),
                          [&](uint32_t a, uint32_t b) { return grown_.nodes[a].outside > grown_.nodes[b].outside; });
         size_t keep = 0;
@@ -174,14 +179,15 @@ private:
             }
             // The ratio falls about like a power of the count: its logarithm measures the way gone.
             const double gone = std::clamp(std::log(first / ratio) / std::log(first / tolerance), 0.0, 1.0);
-            split_all(parents, std::vector<uint32_t>(parents.size(), options_.build.degree), [&](double) { return gone; });
+            split_all(parents, std::vector<uint32_t>(parents.size(), options_.build.degree),
+                      [&](double) { return gone; });
         }
     }
 
     const Voxels& voxels_;
     const GrowOptions& options_;
     Grown grown_;
-    std::vector<uint32_t> exhausted_; // leaves that a split could not divide
+    std::set<uint32_t> exhausted_; // leaves that a split could not improve
 };
 
 } // namespace

@@ -2,25 +2,25 @@
 // reference [16], whose text gives no details; m, the cost and the neighbourhood below are ours).
 //
 // Start: the connected parts of the sub-volume in each block of b x b x b cells, b as small as keeps m below
-// kPiecesPerChild * k. Merging: always the pair of touching pieces whose union adds least error. A piece keeps a support
-// sketch, so that an ellipsoid around a union costs the same whatever its size. When no two touching pieces are left
-// (several components), any two pieces may merge.
+// kPiecesPerChild * k. Merging: always the pair of touching pieces whose union adds least error. A piece keeps a
+// support sketch, so that an ellipsoid around a union costs the same whatever its size. When no two touching pieces are
+// left (several components), any two pieces may merge.
 #include "builder/split.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <queue>
 #include <set>
-#include <unordered_map>
 
 namespace prolate {
 namespace {
 
 constexpr size_t kPiecesPerChild = 16;
-constexpr size_t kSamplesPerPiece = 64;    // for E_sur while merging
-constexpr double kFitTolerance = 2e-2;     // merging ranks pairs; the result is refitted
-constexpr size_t kAllPairsLimit = 400;     // pieces up to which components may pair up freely
+constexpr size_t kSamplesPerPiece = 64; // for E_sur while merging
+constexpr double kFitTolerance = 2e-2;  // merging ranks pairs; the result is refitted
+constexpr size_t kAllPairsLimit = 400;  // pieces up to which components may pair up freely
 
 struct Piece {
     std::vector<uint32_t> cells;
@@ -37,26 +37,27 @@ uint32_t find_root(std::vector<uint32_t>& parent, uint32_t i) {
     return i;
 }
 
-// Positions in `cells` of the neighbours of cells[position] with a larger position, among 26 around it.
+// Which cells of a set touch each other.
 class Neighbourhood {
 public:
-    Neighbourhood(const Voxels& voxels, std::span<const uint32_t> cells) : voxels_(voxels), cells_(cells) {
-        position_.reserve(cells.size());
-        for (uint32_t i = 0; i < cells.size(); ++i) position_.emplace(cells[i], i);
+    Neighbourhood(const Voxels& voxels, std::span<const uint32_t> cells)
+        : voxels_(voxels), cells_(cells), position_(voxels.cell_count(), Voxels::kNoCell) {
+        for (uint32_t i = 0; i < cells.size(); ++i) position_[cells[i]] = i;
     }
+    // Visits the positions in the set of the cells that touch cells[position], by half of the 26 around it: over all
+    // positions, each pair once.
     template <class Visit> void later(uint32_t position, Visit&& visit) const {
         const auto& [i, j, k] = voxels_.coordinates(cells_[position]);
-        for (int n = 14; n < 27; ++n) { // half of the 3 x 3 x 3 block: each pair once
+        for (int n = 14; n < 27; ++n) {
             const uint32_t cell = voxels_.cell_at(i + n / 9 - 1, j + n / 3 % 3 - 1, k + n % 3 - 1);
-            if (cell == Voxels::kNoCell) continue;
-            if (const auto found = position_.find(cell); found != position_.end()) visit(found->second);
+            if (cell != Voxels::kNoCell && position_[cell] != Voxels::kNoCell) visit(position_[cell]);
         }
     }
 
 private:
     const Voxels& voxels_;
     std::span<const uint32_t> cells_;
-    std::unordered_map<uint32_t, uint32_t> position_;
+    std::vector<uint32_t> position_; // of each cell of the grid in the set
 };
 
 // Connected parts in blocks of b cells: for each cell, the number of its part; returns how many there are.
@@ -165,10 +166,12 @@ std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t
     std::vector<uint32_t> label;
     uint32_t count = 0;
     const int longest = *std::max_element(voxels.size().begin(), voxels.size().end());
-    for (int b = 1;; b = b < 4 ? b + 1 : b * 5 / 4) {
-        count = label_blocks(voxels, cells, neighbourhood, b, true, label);
+    // A block holds at most b^3 cells, so smaller ones need not be tried.
+    int side = std::max(1, static_cast<int>(std::cbrt(static_cast<double>(cells.size()) / static_cast<double>(most))));
+    for (;; side = side < 4 ? side + 1 : side * 5 / 4) {
+        count = label_blocks(voxels, cells, neighbourhood, side, true, label);
         if (count <= most) break;
-        if (b > longest) { // dust: more separate parts than pieces; group them by place
+        if (side > longest) { // dust: more separate parts than pieces; group them by place
             for (int block = longest;; block = std::max(1, block / 2)) {
                 std::vector<uint32_t> finer;
                 const uint32_t finer_count = label_blocks(voxels, cells, neighbourhood, block, false, finer);
@@ -186,7 +189,6 @@ std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t
     for (uint32_t p = 0; p < cells.size(); ++p) {
         Piece& piece = merger.pieces[label[p]];
         piece.cells.push_back(cells[p]);
-        piece.sketch.add(voxels.points(cells[p]));
         const auto samples = voxels.samples(cells[p]);
         piece.samples.insert(piece.samples.end(), samples.begin(), samples.end());
         neighbourhood.later(p, [&](uint32_t q) {
@@ -197,6 +199,7 @@ std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t
     }
     for (Piece& piece : merger.pieces) {
         Merger::thin(piece.samples);
+        for (const uint32_t cell : voxels.hull_cells(piece.cells)) piece.sketch.add(voxels.points(cell));
         piece.error = merger.error(piece.sketch, piece.samples, {});
     }
     uint32_t left = count;

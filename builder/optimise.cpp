@@ -21,7 +21,7 @@ namespace prolate {
 namespace {
 
 constexpr size_t kSurfaceSamples = 128; // per ellipsoid, for E_sur during a search
-constexpr double kFirstReward = 0.1;   // per volume inside the solid, against 1 per volume outside
+constexpr double kFirstReward = 0.1;    // per volume inside the solid, against 1 per volume outside
 
 bool ratio_allowed(const Fit& fit, double min_radius) {
     // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
@@ -93,7 +93,8 @@ public:
             const int k1 = std::min(static_cast<int>(w1), low_[2] + size_[2] - 1);
             for (int k = static_cast<int>(w0); k <= k1; ++k) {
                 const double length = std::min(w1, k + 1.0) - std::max(w0, double(k));
-                taken += area * length * (row[k - low_[2]] ? 1.0 : double{voxels_.solid_fraction(first + static_cast<size_t>(k))});
+                taken += area * length *
+                         (row[k - low_[2]] ? 1.0 : double{voxels_.solid_fraction(first + static_cast<size_t>(k))});
             }
         });
         const double unit = voxels_.pitch() * voxels_.pitch() * voxels_.pitch();
@@ -133,18 +134,20 @@ public:
             const int cycle = (options_.sweeps + 1) / 2, at = sweep % cycle;
             const double reward = kFirstReward * std::max(0.0, 1 - 1.5 * at / std::max(1, cycle - 1));
             for (size_t i = 0; i < fits_.size(); ++i) improve(i, reward);
-            if (reward == 0) keep_best();
+            keep_best();
         }
         fits_ = best_;
     }
 
     // Each cell to the ellipsoid that holds it most centrally.
-    void assign(std::vector<Cluster>& clusters) {
+    Split assign() {
         for (size_t i = 0; i < fits_.size(); ++i) {
             exclude(i); // fits_ may have been exchanged: recompute who holds what
             include(i);
         }
-        clusters.assign(fits_.size(), {});
+        Split out;
+        std::vector<Cluster>& clusters = out.clusters;
+        clusters.resize(fits_.size());
         for (size_t i = 0; i < fits_.size(); ++i) clusters[i].fit = fits_[i];
         for (size_t c = 0; c < cells_.size(); ++c) {
             size_t owner = fits_.size();
@@ -157,6 +160,8 @@ public:
             clusters[owner].cells.push_back(cells_[c]);
         }
         std::erase_if(clusters, [](const Cluster& cluster) { return cluster.cells.empty(); });
+        out.outside = union_outside();
+        return out;
     }
 
 private:
@@ -226,10 +231,11 @@ private:
 
     Fit search(const Fit& current, std::span<const uint32_t> alone, double reward, double& added) {
         // What binds: the extreme points of the cells held alone.
+        const std::vector<uint32_t> hull = voxels_.hull_cells(alone);
         Sketch sketch;
+        for (const uint32_t cell : hull) sketch.add(voxels_.points(cell));
         std::vector<Vec> samples;
         for (const uint32_t cell : alone) {
-            sketch.add(voxels_.points(cell));
             const auto own = voxels_.samples(cell);
             samples.insert(samples.end(), own.begin(), own.end());
         }
@@ -244,7 +250,7 @@ private:
 
         const Fit fresh = fit_cells(voxels_, alone, options_.min_radius);
         // Where the fresh fit touches, it may touch at points that the sketch does not have.
-        for (const uint32_t cell : alone)
+        for (const uint32_t cell : hull)
             for (const Vec& p : voxels_.points(cell))
                 if (fresh.radial_squared(p) > 0.98) core.push_back(p);
         if (core.size() > 256) { // many cells touch: keep an even choice of the extra ones
@@ -277,28 +283,39 @@ private:
         }
         // Cover of all the points, not of the core alone.
         double reach = 1;
-        for (const uint32_t cell : alone) reach = std::max(reach, best.reach(voxels_.points(cell)));
+        for (const uint32_t cell : hull) reach = std::max(reach, best.reach(voxels_.points(cell)));
         best = best.scaled(reach * (1 + 1e-9));
         error_of(best, {}, 0, &added);
         return best;
     }
 
-    void keep_best() {
-        double error = 0;
-        // Adding them one by one, each against those before it, sums to the union.
-        for (size_t i = 0; i < fits_.size(); ++i) coverage_.add(included_[i], -1);
-        std::vector<std::vector<uint32_t>> own(fits_.size());
-        for (size_t c = 0; c < cells_.size(); ++c)
-            for (size_t i = 0; i < fits_.size(); ++i)
-                if (holds_[i][c]) {
-                    own[i].push_back(cells_[c]);
-                    break;
-                }
-        for (size_t i = 0; i < fits_.size(); ++i) {
-            error += options_.error(surface_error(fits_[i], voxels_, own[i]),
-                                    coverage_.added_volume(fits_[i]).added);
+    // Volume of the union outside the solid. Taking the ellipsoids one by one, each against those before it, sums to
+    // the union; `each` gets the index and the volume that it adds.
+    template <class Each> double union_outside(Each&& each) {
+        double outside = 0;
+        for (const Fit& fit : included_) coverage_.add(fit, -1);
+        for (size_t i = 0; i < included_.size(); ++i) {
+            const double added = coverage_.added_volume(included_[i]).added;
+            each(i, added);
+            outside += added;
             coverage_.add(included_[i], +1);
         }
+        return outside;
+    }
+    double union_outside() {
+        return union_outside([](size_t, double) {});
+    }
+
+    void keep_best() {
+        std::vector<std::vector<uint32_t>> own(fits_.size()); // for E_sur: each cell counts once
+        for (size_t c = 0; c < cells_.size(); ++c) {
+            size_t first = 0;
+            while (!holds_[first][c]) ++first;
+            own[first].push_back(cells_[c]);
+        }
+        double error = 0;
+        union_outside(
+            [&](size_t i, double added) { error += options_.error(surface_error(fits_[i], voxels_, own[i]), added); });
         if (best_.empty() || error < best_error_) best_ = fits_, best_error_ = error;
     }
 
@@ -318,12 +335,11 @@ private:
 
 } // namespace
 
-void optimise(const Voxels& voxels, std::span<const uint32_t> cells, std::vector<Cluster>& clusters,
-              const SplitOptions& options) {
-    if (clusters.size() < 2) return;
+Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
+               const SplitOptions& options) {
     Optimiser optimiser(voxels, cells, clusters, options);
-    optimiser.run();
-    optimiser.assign(clusters);
+    if (clusters.size() > 1) optimiser.run();
+    return optimiser.assign();
 }
 
 } // namespace prolate

@@ -1,7 +1,7 @@
 // The error metrics of the paper's section 3 on the voxel grid: E_vol (eqs. 2, 5), E_sur (eq. 1) and their sum (eq. 3).
 //
-// Eq. 5 counts voxels whose centers are inside the ellipsoid and outside the solid. Here a voxel carries the exact share
-// that is solid, and the ellipsoid is exact along z, so that small ellipsoids see a smooth error too.
+// Eq. 5 counts voxels whose centers are inside the ellipsoid and outside the solid. Here a voxel carries the exact
+// share that is solid, and the ellipsoid is exact along z, so that small ellipsoids see a smooth error too.
 #pragma once
 
 #include "builder/fit.hpp"
@@ -21,10 +21,10 @@ struct HybridError {
     }
 };
 
-/// Visits the rows of the grid (and its continuation beyond the border) that `fit` meets: visit(i, j, z0, z1, area) with
-/// cell indices i, j - possibly out of range -, the row's ends in cells from the grid's floor, and its cross-section in
-/// cells. `divide` x `divide` rows go through each cell's footprint, evenly; 0 chooses so many that a small ellipsoid
-/// still meets about a hundred.
+/// Visits the rows of the grid (and its continuation beyond the border) that `fit` meets: visit(i, j, z0, z1, area)
+/// with cell indices i, j - possibly out of range -, the row's ends in cells from the grid's floor, and its
+/// cross-section in cells. `divide` x `divide` rows go through each cell's footprint, evenly; 0 chooses so many that a
+/// small ellipsoid still meets about a hundred.
 template <class Visit> void for_each_row(const Fit& fit, const Voxels& voxels, Visit&& visit, int divide = 0) {
     const Vec half = fit.half_extents() / voxels.pitch(), center = (fit.center - voxels.origin()) / voxels.pitch();
     const Mat inverse = fit.inverse * voxels.pitch();

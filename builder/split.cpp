@@ -4,7 +4,8 @@
 
 namespace prolate {
 
-Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> cells, double min_radius) {
+Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> all, double min_radius) {
+    const std::vector<uint32_t> cells = voxels.hull_cells(all);
     Sketch sketch;
     for (const uint32_t cell : cells) sketch.add(voxels.points(cell));
     const auto less = [](const Vec& a, const Vec& b) {
@@ -40,11 +41,8 @@ Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> cells, double min_
     return fit.scaled(reach);
 }
 
-std::vector<Cluster> split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
-                           const SplitOptions& options) {
-    std::vector<Cluster> clusters = merge_pieces(voxels, cells, k, options);
-    optimise(voxels, cells, clusters, options);
-    return clusters;
+Split split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, const SplitOptions& options) {
+    return optimise(voxels, cells, merge_pieces(voxels, cells, k, options), options);
 }
 
 } // namespace prolate

@@ -18,9 +18,9 @@ struct Cluster {
 
 struct SplitOptions {
     HybridError error;
-    double min_radius;          ///< metres; keeps flat parts from flat ellipsoids
-    int sweeps;                 ///< of the variational optimisation
-    int trials;                 ///< proposals an ellipsoid and sweep
+    double min_radius; ///< metres; keeps flat parts from flat ellipsoids
+    int sweeps;        ///< of the variational optimisation
+    int trials;        ///< proposals an ellipsoid and sweep
     uint64_t seed;
     const std::atomic<bool>* cancelled; ///< checked between sweeps; then the result is to be thrown away
 };
@@ -33,13 +33,18 @@ Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> cells, double min_
 std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
                                   const SplitOptions& options);
 
-/// Step 7: lowers the error of `clusters`, which together hold `cells`, by moving and reshaping one ellipsoid at a time.
-/// The clusters still partition `cells` afterwards; those that nothing is left for are dropped.
-void optimise(const Voxels& voxels, std::span<const uint32_t> cells, std::vector<Cluster>& clusters,
-              const SplitOptions& options);
+/// Clusters that partition the cells of a node.
+struct Split {
+    std::vector<Cluster> clusters;
+    double outside = 0; ///< volume of (union of their ellipsoids \ solid)
+};
 
-/// Steps 6 and 7: up to k clusters that partition `cells`.
-std::vector<Cluster> split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
-                           const SplitOptions& options);
+/// Step 7: lowers the error of `clusters`, which partition `cells`, by moving and reshaping one ellipsoid at a time.
+/// The result partitions them too, without the clusters that nothing is left for.
+Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
+               const SplitOptions& options);
+
+/// Steps 6 and 7: up to k clusters.
+Split split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, const SplitOptions& options);
 
 } // namespace prolate

@@ -1,14 +1,13 @@
 // Proof of cover by adaptive subdivision, from the decoded tree and the mesh alone.
 //
 // For a box B, the polyhedron (solid ∩ B) is the convex combination of its extreme points, and those are corners of the
-// triangles clipped to B, or corners of B inside the solid. If all of them lie in one ellipsoid, so does the whole piece,
-// because an ellipsoid is convex. Otherwise B is cut into eight. The proof ends because the ellipsoids overlap: around
-// each point of the solid there is a box small enough for one of them, unless that point is on the very border of all
-// ellipsoids that contain it.
+// triangles clipped to B, or corners of B inside the solid. If all of them lie in one ellipsoid, so does the whole
+// piece, because an ellipsoid is convex. Otherwise B is cut into eight. The proof ends because the ellipsoids overlap:
+// around each point of the solid there is a box small enough for one of them, unless that point is on the very border
+// of all ellipsoids that contain it.
 //
-// Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners of B are
-// classified by the winding number, evaluated to better than 0.1 where 0 and 1 are the only values, with a threshold of
-// 0.25: in doubt a corner belongs to the solid.
+// Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners
+// of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
 //
 // Shares no data with the bake: other boxes, other inside test (dipole tree instead of columns).
 #include <prolate/verify.hpp>
@@ -29,11 +28,11 @@
 namespace prolate {
 namespace {
 
-constexpr double kTolerance = 1e-12;     // of the largest coordinate: corners must be inside by this much
-constexpr double kSmallestBox = 1e-9;    // of the mesh's size: below, the proof gives up
+constexpr double kTolerance = 1e-12;           // of the largest coordinate: corners must be inside by this much
+constexpr double kSmallestBox = 1e-9;          // of the mesh's size: below, the proof gives up
 constexpr uint64_t kPiecesPerTask = 4'000'000; // a bound on the work at hostile trees; real ones need about 10,000
-constexpr double kAccuracy = 3;          // of the winding number, see Winding
-constexpr int kTaskLevels = 3;           // 8^3 boxes to share between threads
+constexpr double kAccuracy = 3;                // of the winding number, see Winding
+constexpr int kTaskLevels = 3;                 // 8^3 boxes to share between threads
 
 struct Shape {
     Fit fit;
@@ -43,7 +42,7 @@ struct Shape {
 
 struct Cell {
     Box box;
-    std::vector<Polygon> polygons;   // the surface in the box
+    std::vector<Polygon> polygons;    // the surface in the box
     std::vector<uint32_t> candidates; // ellipsoids that may meet the box
 };
 
@@ -116,7 +115,13 @@ public:
     }
 
 private:
-    bool inside(const Vec& p) const { return std::abs((*winding_)(p, kAccuracy)) > 0.25; }
+    // Winding number of a closed mesh. It is whole but on the surface, so a value in between tells of the error of the
+    // fast evaluation: then the exact sum.
+    double winding(const Vec& p) const {
+        const double fast = (*winding_)(p, kAccuracy);
+        return std::abs(fast - std::round(fast)) < 0.1 ? fast : (*winding_)(p, HUGE_VAL);
+    }
+    bool inside(const Vec& p) const { return std::abs(winding(p)) > 0.25; }
 
     static bool holds(const Shape& shape, const Vec& p) { return shape.fit.radial_squared(p) <= shape.shrunk; }
 
@@ -178,7 +183,7 @@ private:
         for (unsigned i = 0; i < 9 && proof.covered; ++i) {
             const Vec p = i < 8 ? cell.box.corner(i) : cell.box.center();
             // A point that close to 1/2 lies on the surface: as good a witness as any, but 3/4 leaves no doubt.
-            check(p, [&] { return std::abs((*winding_)(p, kAccuracy)) > 0.75; });
+            check(p, [&] { return std::abs(winding(p)) > 0.75; });
         }
     }
 
@@ -278,13 +283,12 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
             shape.shrunk = margin > 0 ? margin * margin - 1e-14 : -1;
             shapes.push_back(shape);
         });
-        const auto progress = [&](double fraction) {
-            return options.progress((l + fraction) / tree.level_count());
-        };
+        const auto progress = [&](double fraction) { return options.progress((l + fraction) / tree.level_count()); };
         std::function<bool(double)> level_progress;
         if (options.progress) level_progress = progress;
         LevelProof proof;
-        arena.execute([&] { proof = prove_level(shapes, solid, winding ? &*winding : nullptr, box, level_progress, stop); });
+        arena.execute(
+            [&] { proof = prove_level(shapes, solid, winding ? &*winding : nullptr, box, level_progress, stop); });
         if (stop) return Error{ErrorCode::cancelled, "cancelled", 0};
         report.covered = report.covered && proof.covered;
         report.levels.push_back(proof);

@@ -38,9 +38,9 @@ Voxels::Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t reso
 
 void Voxels::measure_fractions(MeshView mesh, bool closed, const Winding& winding) {
     const double sub = pitch_ / kSubColumns;
-    const Columns columns(mesh, closed, winding,
-                          {origin_.x() + 0.5 * sub, origin_.y() + 0.5 * sub, sub, size_[0] * kSubColumns,
-                           size_[1] * kSubColumns});
+    const Columns columns(
+        mesh, closed, winding,
+        {origin_.x() + 0.5 * sub, origin_.y() + 0.5 * sub, sub, sub, size_[0] * kSubColumns, size_[1] * kSubColumns});
     solid_volume_ = columns.volume();
     solid_.assign(static_cast<size_t>(size_[0]) * static_cast<size_t>(size_[1]) * static_cast<size_t>(size_[2]), 0);
     constexpr double kShare = 1.0 / (kSubColumns * kSubColumns);
@@ -60,7 +60,8 @@ void Voxels::measure_fractions(MeshView mesh, bool closed, const Winding& windin
     for (int i = 0; i < size_[0]; ++i)
         for (int j = 0; j < size_[1]; ++j) {
             float sum = 0;
-            for (int k = 0; k < size_[2]; ++k) below_[index(i, j, k)] = std::exchange(sum, sum + solid_[index(i, j, k)]);
+            for (int k = 0; k < size_[2]; ++k)
+                below_[index(i, j, k)] = std::exchange(sum, sum + solid_[index(i, j, k)]);
         }
 }
 
@@ -119,7 +120,8 @@ void Voxels::collect_cells(MeshView mesh, bool closed, const Winding& winding) {
     pieces = {};
 
     // Corners inside the closed solid.
-    const Columns corners(mesh, closed, winding, {origin_.x(), origin_.y(), pitch_, size_[0] + 1, size_[1] + 1});
+    const Columns corners(mesh, closed, winding,
+                          {origin_.x(), origin_.y(), pitch_, pitch_, size_[0] + 1, size_[1] + 1});
     const auto corner_index = [&](int i, int j, int k) {
         return (static_cast<size_t>(i) * static_cast<size_t>(size_[1] + 1) + static_cast<size_t>(j)) *
                    static_cast<size_t>(size_[2] + 1) +
@@ -130,8 +132,10 @@ void Voxels::collect_cells(MeshView mesh, bool closed, const Winding& winding) {
     for (int i = 0; i <= size_[0]; ++i)
         for (int j = 0; j <= size_[1]; ++j)
             for (const Interval& solid : corners.column(i, j)) {
-                const int k1 = std::min(static_cast<int>(std::floor((solid.high + tie - origin_.z()) / pitch_)), size_[2]);
-                for (int k = std::max(static_cast<int>(std::ceil((solid.low - tie - origin_.z()) / pitch_)), 0); k <= k1; ++k)
+                const int k1 =
+                    std::min(static_cast<int>(std::floor((solid.high + tie - origin_.z()) / pitch_)), size_[2]);
+                for (int k = std::max(static_cast<int>(std::ceil((solid.low - tie - origin_.z()) / pitch_)), 0);
+                     k <= k1; ++k)
                     inside[corner_index(i, j, k)] = true;
             }
 
@@ -195,6 +199,23 @@ void Voxels::sample_surface(MeshView mesh, uint32_t count, uint64_t seed) {
     samples_.resize(found.size());
     std::vector<size_t> fill(sample_begin_.begin(), sample_begin_.end() - 1);
     for (const auto& [cell, point] : found) samples_[fill[cell]++] = point;
+}
+
+std::vector<uint32_t> Voxels::hull_cells(std::span<const uint32_t> cells) const {
+    std::vector<bool> member(cell_count(), false);
+    for (const uint32_t cell : cells) member[cell] = true;
+    const auto has = [&](int i, int j, int k) {
+        const uint32_t cell = cell_at(i, j, k);
+        return cell != kNoCell && member[cell];
+    };
+    std::vector<uint32_t> out;
+    for (const uint32_t cell : cells) {
+        const auto& [i, j, k] = coordinates_[cell];
+        if (on_surface_[cell] || !has(i - 1, j, k) || !has(i + 1, j, k) || !has(i, j - 1, k) || !has(i, j + 1, k) ||
+            !has(i, j, k - 1) || !has(i, j, k + 1))
+            out.push_back(cell);
+    }
+    return out;
 }
 
 } // namespace prolate

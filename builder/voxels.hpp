@@ -1,9 +1,10 @@
 // The voxelised solid (paper, section 4, steps 1 and 2): which part of the solid lies in which cell.
 //
-// A cell's *piece* is (solid ∩ cell), given by points whose convex hull contains it: the corners of the mesh's triangles
-// clipped to the cell, and the cell's own corners inside the solid. Those are all the extreme points that the
-// polyhedron (solid ∩ cell) can have, so an ellipsoid - it is convex - that contains the points contains the piece. Every
-// cover in the builder is a cover of points for that reason, and sheets thinner than a cell are covered like the rest.
+// A cell's *piece* is (solid ∩ cell), given by points whose convex hull contains it: the corners of the mesh's
+// triangles clipped to the cell, and the cell's own corners inside the solid. Those are all the extreme points that the
+// polyhedron (solid ∩ cell) can have, so an ellipsoid - it is convex - that contains the points contains the piece.
+// Every cover in the builder is a cover of points for that reason, and sheets thinner than a cell are covered like the
+// rest.
 #pragma once
 
 #include "builder/columns.hpp"
@@ -40,6 +41,10 @@ public:
     double radius(uint32_t cell) const { return balls_[cell].radius; }
     /// True if a part of the surface lies in the cell.
     bool on_surface(uint32_t cell) const { return on_surface_[cell]; }
+
+    /// Those of `cells` that the convex hull of all their points rests on: the others are full and have all six face
+    /// neighbours among `cells`, so their corners are their neighbours' too.
+    std::vector<uint32_t> hull_cells(std::span<const uint32_t> cells) const;
 
     const std::array<int, 3>& coordinates(uint32_t cell) const { return coordinates_[cell]; }
     /// The cell at (i, j, k), or kNoCell; any integers.

@@ -31,7 +31,7 @@ Winding::Winding(MeshView mesh) {
 void Winding::build(uint32_t begin, uint32_t end) {
     const auto index = static_cast<uint32_t>(nodes_.size());
     nodes_.emplace_back();
-    Node node{Vec::Zero(), Vec::Zero(), 0, begin, end, 0};
+    Node node{Vec::Zero(), Vec::Zero(), Mat::Zero(), 0, begin, end, 0};
     Box box;
     double area_sum = 0;
     for (uint32_t i = begin; i < end; ++i) {
@@ -44,8 +44,11 @@ void Winding::build(uint32_t begin, uint32_t end) {
         for (const Vec& v : corners_[i]) box.add(v);
     }
     node.center = area_sum > 0 ? Vec(node.center / area_sum) : box.center();
-    for (uint32_t i = begin; i < end; ++i)
+    for (uint32_t i = begin; i < end; ++i) {
+        const auto& [a, b, c] = corners_[i];
+        node.moment += 0.5 * (b - a).cross(c - a) * ((a + b + c) / 3 - node.center).transpose();
         for (const Vec& v : corners_[i]) node.radius = std::max(node.radius, (v - node.center).norm());
+    }
     if (end - begin > kLeafTriangles) {
         int axis = 0;
         box.size().maxCoeff(&axis);
@@ -78,7 +81,10 @@ double Winding::operator()(const Vec& p, double accuracy) const {
         const Vec d = node.center - p;
         const double distance = d.norm();
         if (distance > accuracy * node.radius) {
-            angle += node.dipole.dot(d) / (distance * distance * distance);
+            // n . K(d + e) ~ n . K(d) + n . (dK/dd) e with K(d) = d / |d|^3.
+            const double cube = distance * distance * distance;
+            angle +=
+                (node.dipole.dot(d) + node.moment.trace() - 3 * d.dot(node.moment * d) / (distance * distance)) / cube;
         } else if (node.right == 0) {
             for (uint32_t i = node.begin; i < node.end; ++i)
                 angle += solid_angle(corners_[i][0], corners_[i][1], corners_[i][2], p);

@@ -149,7 +149,8 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     if (step < format::kMinStepExponent || step > format::kMaxStepExponent)
         return bad("lattice step out of range", kAtStepExponent);
     if (!is_metric(load_le<double>(h + kAtSolidVolume))) return bad("solid volume out of range", kAtSolidVolume);
-    if (load_le<uint8_t>(h + kAtMethod) > static_cast<uint8_t>(Method::analytic)) return bad("unknown method", kAtMethod);
+    if (load_le<uint8_t>(h + kAtMethod) > static_cast<uint8_t>(Method::analytic))
+        return bad("unknown method", kAtMethod);
     if (load_le<uint8_t>(h + kAtPrimitive) > static_cast<uint8_t>(Primitive::sphere))
         return bad("unknown primitive", kAtPrimitive);
     if (load_le<uint8_t>(h + kAtQuality) > static_cast<uint8_t>(Quality::best))
@@ -158,7 +159,8 @@ Result<void> check_header(std::span<const std::byte> bytes) {
         if (!std::isfinite(load_le<float>(h + at)) || load_le<float>(h + at) < 0) return bad("option out of range", at);
     if (!all_zero(h + kAtReserved0, 2)) return bad("reserved bytes are not zero", kAtReserved0);
     if (!all_zero(h + kAtReserved1, 1)) return bad("reserved bytes are not zero", kAtReserved1);
-    if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2)) return bad("reserved bytes are not zero", kAtReserved2);
+    if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
+        return bad("reserved bytes are not zero", kAtReserved2);
     return {};
 }
 
@@ -194,15 +196,15 @@ void quantise(PackedNode& node, const Lattice& lattice, const double center[3], 
     double largest = 0;
     for (int i = 0; i < 3; ++i) largest = std::max({largest, diagonal[i], std::abs(off[i])});
     // The smallest exponent at which the largest entry fits after rounding.
-    int exponent = std::clamp(largest > 0 ? std::ilogb(largest) + 1 : kMinNodeExponent, kMinNodeExponent,
-                              kMaxNodeExponent);
+    int exponent =
+        std::clamp(largest > 0 ? std::ilogb(largest) + 1 : kMinNodeExponent, kMinNodeExponent, kMaxNodeExponent);
     if (std::ldexp(largest, 16 - exponent) > UINT16_MAX - 1.0 && exponent < kMaxNodeExponent) ++exponent;
     node.exponent = static_cast<int8_t>(exponent);
     for (size_t i = 0; i < 3; ++i) {
         node.diagonal[i] = static_cast<uint16_t>(
             std::clamp(std::nearbyint(std::ldexp(diagonal[i], 16 - exponent)), 1.0, double{UINT16_MAX}));
-        node.off_diagonal[i] = static_cast<int16_t>(std::clamp(
-            std::nearbyint(std::ldexp(off[i], 15 - exponent)), double{INT16_MIN}, double{INT16_MAX}));
+        node.off_diagonal[i] = static_cast<int16_t>(
+            std::clamp(std::nearbyint(std::ldexp(off[i], 15 - exponent)), double{INT16_MIN}, double{INT16_MAX}));
     }
 }
 

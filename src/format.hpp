@@ -29,8 +29,8 @@ inline constexpr int32_t kMinNodeExponent = -100, kMaxNodeExponent = 100;
 struct PackedNode {
     uint32_t first_child = 0;
     uint16_t center[3] = {};
-    uint16_t diagonal[3] = {1, 1, 1};  // l11, l22, l33
-    int16_t off_diagonal[3] = {};      // l21, l31, l32
+    uint16_t diagonal[3] = {1, 1, 1}; // l11, l22, l33
+    int16_t off_diagonal[3] = {};     // l21, l31, l32
     int8_t exponent = 0;
     uint8_t child_count = 0;
 };

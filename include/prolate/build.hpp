@@ -17,13 +17,13 @@ struct BuildOptions {
     uint32_t levels = 0;     ///< levels below the root, 1 ... kMaxLevels - 1
     uint32_t ellipsoids = 0; ///< leaves, 1 ... 65536: the worst node is split next until there are exactly so many
     float tolerance = 0;     ///< outside ratio of the leaves, above 0: the worst node is split next until it is met
-    Method method = Method::voxel;             ///< only voxel in this version
+    Method method = Method::voxel;              ///< only voxel in this version
     Primitive primitive = Primitive::ellipsoid; ///< only ellipsoid in this version
-    Quality quality = Quality::normal;         ///< voxel resolution and number of optimisation sweeps
-    float alpha = 0.5f; ///< weight of E_sur^3, >= 0 (paper, eq. 3)
-    float beta = 0.5f;  ///< weight of E_vol, >= 0; alpha + beta > 0
-    uint64_t seed = 1;  ///< of the surface sampling
-    uint32_t threads = 0; ///< 0 = all cores. The bytes do not depend on it.
+    Quality quality = Quality::normal;          ///< voxel resolution and number of optimisation sweeps
+    float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
+    float beta = 0.5f;                          ///< weight of E_vol, >= 0; alpha + beta > 0
+    uint64_t seed = 1;                          ///< of the surface sampling
+    uint32_t threads = 0;                       ///< 0 = all cores. The bytes do not depend on it.
 };
 
 /// Checks ranges. Fails with bad_options or unsupported.
@@ -44,14 +44,14 @@ using ProgressCallback = std::function<bool(const BuildProgress&)>;
 
 /// Figures of one level's cut.
 struct LevelReport {
-    uint32_t nodes = 0;        ///< ellipsoids of the cut
-    uint64_t bytes = 0;        ///< file size up to here
-    double outside_ratio = 0;  ///< vol(union \ solid) / vol(solid), by columns; NaN if the solid has no volume
-    double union_volume = 0;   ///< cubic metres
+    uint32_t nodes = 0;           ///< ellipsoids of the cut
+    uint64_t bytes = 0;           ///< file size up to here
+    double outside_ratio = 0;     ///< vol(union \ solid) / vol(solid), by columns; NaN if the solid has no volume
+    double union_volume = 0;      ///< cubic metres
     double sum_outside_ratio = 0; ///< sum of the single ellipsoids' outside volumes / vol(solid), by voxels
-    double surface_error = 0;  ///< largest E_sur, metres
-    bool covered = false;      ///< proved by verify()
-    double seconds = 0;        ///< wall time spent on this level, proof included
+    double surface_error = 0;     ///< largest E_sur, metres
+    bool covered = false;         ///< proved by verify()
+    double seconds = 0;           ///< wall time spent on this level, proof included
 };
 
 /// What build() made, and what it saw.

@@ -7,9 +7,17 @@
 
 namespace prolate {
 
-inline Eigen::Vector3f to_eigen(const Vec3& v) { return {v.x, v.y, v.z}; }
-inline Vec3 from_eigen(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z()}; }
-inline Eigen::Quaternionf to_eigen(const Quat& q) { return {q.w, q.x, q.y, q.z}; }
-inline Quat from_eigen(const Eigen::Quaternionf& q) { return {q.x(), q.y(), q.z(), q.w()}; }
+inline Eigen::Vector3f to_eigen(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+inline Vec3 from_eigen(const Eigen::Vector3f& v) {
+    return {v.x(), v.y(), v.z()};
+}
+inline Eigen::Quaternionf to_eigen(const Quat& q) {
+    return {q.w, q.x, q.y, q.z};
+}
+inline Quat from_eigen(const Eigen::Quaternionf& q) {
+    return {q.x(), q.y(), q.z(), q.w()};
+}
 
 } // namespace prolate

@@ -10,14 +10,14 @@ namespace prolate {
 
 /// What went wrong. Values are stable and never reused.
 enum class ErrorCode : uint8_t {
-    bad_options = 1,    ///< an option is out of its range
-    bad_mesh = 2,       ///< the mesh cannot be baked (no triangles, indices out of range, not finite, no extent)
-    bad_file = 3,       ///< bytes that are not a sound .etree or mesh file
-    newer_version = 4,  ///< an .etree of a later format version than this library reads
-    io = 5,             ///< the operating system refused to read or write
-    cancelled = 6,      ///< the progress callback asked to stop
-    unsupported = 7,    ///< a known word whose work this version does not do
-    internal = 8,       ///< a promise of the library did not hold; please report it
+    bad_options = 1,   ///< an option is out of its range
+    bad_mesh = 2,      ///< the mesh cannot be baked (no triangles, indices out of range, not finite, no extent)
+    bad_file = 3,      ///< bytes that are not a sound .etree or mesh file
+    newer_version = 4, ///< an .etree of a later format version than this library reads
+    io = 5,            ///< the operating system refused to read or write
+    cancelled = 6,     ///< the progress callback asked to stop
+    unsupported = 7,   ///< a known word whose work this version does not do
+    internal = 8,      ///< a promise of the library did not hold; please report it
 };
 
 /// A failure. `what` is static text in plain words; `where` is the byte offset, triangle index or option value

@@ -9,13 +9,19 @@
 
 namespace prolate {
 
-inline glm::vec3 to_glm(const Vec3& v) { return {v.x, v.y, v.z}; }
-inline Vec3 from_glm(const glm::vec3& v) { return {v.x, v.y, v.z}; }
+inline glm::vec3 to_glm(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+inline Vec3 from_glm(const glm::vec3& v) {
+    return {v.x, v.y, v.z};
+}
 inline glm::quat to_glm(const Quat& q) {
     glm::quat out;
     out.x = q.x, out.y = q.y, out.z = q.z, out.w = q.w;
     return out;
 }
-inline Quat from_glm(const glm::quat& q) { return {q.x, q.y, q.z, q.w}; }
+inline Quat from_glm(const glm::quat& q) {
+    return {q.x, q.y, q.z, q.w};
+}
 
 } // namespace prolate

@@ -31,14 +31,14 @@ struct Mesh {
 struct MeshReport {
     uint32_t input_vertices = 0;
     uint32_t input_triangles = 0;
-    uint32_t merged_vertices = 0;      ///< vertices that lay exactly on an earlier one
-    uint32_t unused_vertices = 0;      ///< vertices of no kept triangle
+    uint32_t merged_vertices = 0; ///< vertices that lay exactly on an earlier one
+    uint32_t unused_vertices = 0; ///< vertices of no kept triangle
     /// Of zero area. Those with a repeated corner are dropped if their points lie in other triangles; the rest stay, so
     /// that no point of the surface is lost.
     uint32_t degenerate_triangles = 0;
-    uint32_t open_edges = 0;           ///< edges whose triangles do not cancel (boundary, or inconsistently oriented)
-    uint32_t non_manifold_edges = 0;   ///< edges of three or more triangles
-    bool closed = false;               ///< no open edge: winding numbers are whole, and the mesh bounds a solid
+    uint32_t open_edges = 0;         ///< edges whose triangles do not cancel (boundary, or inconsistently oriented)
+    uint32_t non_manifold_edges = 0; ///< edges of three or more triangles
+    bool closed = false;             ///< no open edge: winding numbers are whole, and the mesh bounds a solid
 };
 
 /// A mesh fit for baking, with the report on how it became so.

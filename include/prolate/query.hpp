@@ -32,8 +32,8 @@ struct QueryOptions {
 
 /// Work that a query did.
 struct QueryStats {
-    uint64_t pair_tests = 0;  ///< ellipsoid pairs tested
-    uint64_t evaluations = 0; ///< evaluations of the certificates, one to a few per pair
+    uint64_t pair_tests = 0;    ///< ellipsoid pairs tested
+    uint64_t evaluations = 0;   ///< evaluations of the certificates, one to a few per pair
     uint32_t deepest_level = 0; ///< deepest level a tested node came from
 };
 

@@ -38,21 +38,21 @@ struct BakeInfo {
     Method method = Method::voxel;
     Primitive primitive = Primitive::ellipsoid;
     Quality quality = Quality::normal;
-    float alpha = 0, beta = 0;   ///< weights of E_sur^3 and E_vol (paper, eq. 3)
-    float tolerance = 0;         ///< asked outside ratio, 0 = not asked
-    uint32_t levels = 0;         ///< asked levels below the root, 0 = not asked
-    uint32_t ellipsoids = 0;     ///< asked leaves, 0 = not asked
-    uint64_t seed = 0;           ///< of the surface sampling
-    uint32_t resolution = 0;     ///< voxels along the longest side
+    float alpha = 0, beta = 0; ///< weights of E_sur^3 and E_vol (paper, eq. 3)
+    float tolerance = 0;       ///< asked outside ratio, 0 = not asked
+    uint32_t levels = 0;       ///< asked levels below the root, 0 = not asked
+    uint32_t ellipsoids = 0;   ///< asked leaves, 0 = not asked
+    uint64_t seed = 0;         ///< of the surface sampling
+    uint32_t resolution = 0;   ///< voxels along the longest side
 };
 
 /// One level of the tree.
 struct LevelInfo {
-    uint32_t first_node = 0;   ///< index of its first node
-    uint32_t node_count = 0;   ///< nodes of this level
-    uint64_t end_byte = 0;     ///< the file's first end_byte bytes are a valid tree that ends with this level
-    float outside_ratio = 0;   ///< volume of (union of the cut \ solid) / volume of the solid, as baked; NaN if unknown
-    float surface_error = 0;   ///< largest E_sur of the cut (paper, eq. 1), metres
+    uint32_t first_node = 0; ///< index of its first node
+    uint32_t node_count = 0; ///< nodes of this level
+    uint64_t end_byte = 0;   ///< the file's first end_byte bytes are a valid tree that ends with this level
+    float outside_ratio = 0; ///< volume of (union of the cut \ solid) / volume of the solid, as baked; NaN if unknown
+    float surface_error = 0; ///< largest E_sur of the cut (paper, eq. 1), metres
 };
 
 /// Children of a node: indices first ... first + count - 1. A leaf has count 0.

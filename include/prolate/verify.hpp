@@ -12,11 +12,11 @@ namespace prolate {
 
 /// Verdict on one level's cut.
 struct LevelProof {
-    bool covered = false;         ///< proved: every point of the solid lies in an ellipsoid of the cut
+    bool covered = false;            ///< proved: every point of the solid lies in an ellipsoid of the cut
     bool has_counterexample = false; ///< `point` belongs to the solid and lies in no ellipsoid of the cut
-    double point[3] = {};         ///< the counterexample, or where the subdivision gave up
-    double depth = 0;             ///< of the counterexample: smallest radial excess |L^-1 (p - c)| - 1 over the cut
-    uint64_t pieces = 0;          ///< pieces of the solid that were looked at
+    double point[3] = {};            ///< the counterexample, or where the subdivision gave up
+    double depth = 0;                ///< of the counterexample: smallest radial excess |L^-1 (p - c)| - 1 over the cut
+    uint64_t pieces = 0;             ///< pieces of the solid that were looked at
 };
 
 struct VerifyReport {
