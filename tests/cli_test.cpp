@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
@@ -14,6 +15,7 @@
 #include <functional>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <thread>
 
@@ -89,9 +91,9 @@ struct Outcome {
 };
 
 struct RunOptions {
-    std::string stdout_path;                // instead of a file that is read back
-    std::function<void()> in_child = [] {}; // after fork; only async-signal-safe calls
-    bool interrupt = false;                 // Ctrl-C as soon as the program catches it
+    std::string stdout_path;                                       // instead of a file that is read back
+    std::function<void()> in_child = [] {};                        // after fork; only async-signal-safe calls
+    std::optional<std::chrono::milliseconds> interrupt_after = {}; // Ctrl-C so long after the program first catches it
 };
 
 // Does the process catch SIGINT yet?
@@ -150,8 +152,9 @@ protected:
             ::_exit(127);
         }
         int status = 0;
-        if (options.interrupt) {
+        if (options.interrupt_after) {
             while (!catches_interrupt(pid) && ::waitpid(pid, &status, WNOHANG) == 0) std::this_thread::yield();
+            std::this_thread::sleep_for(*options.interrupt_after);
             ::kill(pid, SIGINT);
         }
         ::waitpid(pid, &status, 0);
@@ -336,12 +339,14 @@ TEST_F(Cli, NoSpaceLeft) {
 
 TEST_F(Cli, CtrlCLeavesTheOldFile) {
     const std::string mesh = file("large.obj", obj_text(peanut(60))), out = file("out.etree", "old content");
-    RunOptions interrupt;
-    interrupt.interrupt = true;
-    const Outcome o = run({"bake", mesh, "-o", out, "--quality", "best", "--ellipsoids", "5000"}, interrupt);
-    expect_failure(o, 130, mesh, "interrupted");
-    EXPECT_EQ(read(out), "old content");
-    EXPECT_EQ(listing(), (std::vector<std::string>{"large.obj", "out.etree"}));
+    for (const int milliseconds : {0, 400, 1500}) { // while the mesh is read, and in the midst of the work
+        RunOptions interrupt;
+        interrupt.interrupt_after = std::chrono::milliseconds(milliseconds);
+        const Outcome o = run({"bake", mesh, "-o", out, "--quality", "best", "--ellipsoids", "20000"}, interrupt);
+        expect_failure(o, 130, mesh, "interrupted");
+        EXPECT_EQ(read(out), "old content");
+        EXPECT_EQ(listing(), (std::vector<std::string>{"large.obj", "out.etree"}));
+    }
 }
 
 TEST_F(Cli, LinksGoOnPointingAtTheirFile) {

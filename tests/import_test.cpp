@@ -114,8 +114,9 @@ TEST_F(Import, EveryPrefixOfEveryFormatIsRefusedOrWhole) {
         const std::string whole = read(path);
         ASSERT_FALSE(whole.empty());
         const std::string cut_path = (folder_ / ("cut" + fs::path(path).extension().string())).string();
-        size_t refused = 0;
-        for (size_t size = 0; size < whole.size(); ++size) {
+        size_t tried = 0, refused = 0;
+        // Every prefix of small files, and of the last part of larger ones; in between, a stride to save time.
+        for (size_t size = 0; size < whole.size(); size += whole.size() - size < 600 ? 1 : 7, ++tried) {
             std::ofstream(cut_path, std::ios::binary).write(whole.data(), static_cast<std::streamsize>(size));
             const auto mesh = load_mesh(cut_path.c_str());
             refused += !mesh;
@@ -127,7 +128,7 @@ TEST_F(Import, EveryPrefixOfEveryFormatIsRefusedOrWhole) {
                 EXPECT_EQ(mesh->triangles.size(), 4u) << path << " cut at " << size;
             }
         }
-        EXPECT_GT(refused, whole.size() / 2) << path;
+        EXPECT_GT(refused, tried / 2) << path;
     };
     check(write("a.obj", kObj));
     check(write("a.off", kOff));
@@ -297,11 +298,12 @@ void expect_model(const char* path, size_t triangles, uint32_t open_edges) {
     EXPECT_EQ(cleaned->report.closed, open_edges == 0);
     EXPECT_GT(signed_volume(cleaned->mesh), 0);
 }
+// This horse is not closed: 24 of its edges have three triangles, and 2 are run through twice the same way.
 TEST(ImportModel, Horse3ds) {
-    expect_model("/usr/share/glmark2/models/horse.3ds", 7172);
+    expect_model("/usr/share/glmark2/models/horse.3ds", 7172, 26);
 }
 TEST(ImportModel, BunnyObj) {
-    expect_model("/usr/share/glmark2/models/bunny.obj", 69666);
+    expect_model("/usr/share/glmark2/models/bunny.obj", 69666, 0);
 }
 
 } // namespace
