@@ -124,9 +124,10 @@ std::string table_of(const Build& build) {
 
 // What the user should know of the mesh, one line each.
 void diagnose(const std::string& mesh, const MeshReport& report) {
-    if (report.merged_vertices > 0)
-        note(mesh,
-             fmt::format("{} vertices lay exactly on earlier ones and were merged", grouped(report.merged_vertices)));
+    // Some readers give each triangle corners of its own, so the number merged says little of the file.
+    const uint32_t distinct = report.input_vertices - report.merged_vertices - report.unused_vertices;
+    note(mesh, fmt::format("{} triangles on {} distinct vertices ({} as read)", grouped(report.input_triangles),
+                           grouped(distinct), grouped(report.input_vertices)));
     if (report.degenerate_triangles > 0)
         note(mesh, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
     if (report.non_manifold_edges > 0)
