@@ -18,8 +18,9 @@ namespace prolate::cli {
 namespace {
 
 constexpr const char* kFooter = R"(
-Without --level: csv and json hold every node with its own level; ply pictures the finest cut.
-With --level L: the cut at L (the nodes of level L and the leaves above it), which covers the solid.
+The cut at a level (its nodes and the leaves above it) covers the solid. Without --level: csv holds the cut of every
+level, a leaf above it again for each; json holds every node once, with its own level; ply pictures the finest cut.
+With --level L: the cut at L.
 csv: level,cx,cy,cz,r1,r2,r3,R11,...,R33: center, radii, and the rotation row by row; its column i is the direction
 of radius i. ply: ellipsoids as meshes, their corners on the ellipsoids, one color for each child of the root.
 
@@ -38,18 +39,24 @@ struct Selection {
     std::vector<uint32_t> nodes, levels;
 };
 
-Selection select(const TreeView& tree, std::optional<uint32_t> cut) {
+void add_cut(const TreeView& tree, uint32_t level, Selection& to) {
+    tree.for_each_in_cut(level, [&to](uint32_t node) { to.nodes.push_back(node); });
+    to.levels.resize(to.nodes.size(), level);
+}
+
+// Of each level what covers the solid: whoever reads the rows of one level has a whole cover.
+Selection all_cuts(const TreeView& tree) {
     Selection out;
-    if (cut) {
-        tree.for_each_in_cut(*cut, [&out](uint32_t node) { out.nodes.push_back(node); });
-        out.levels.assign(out.nodes.size(), *cut);
-        return out;
+    for (uint32_t l = 0; l < tree.level_count(); ++l) add_cut(tree, l, out);
+    return out;
+}
+
+Selection all_nodes(const TreeView& tree) {
+    Selection out;
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        for (uint32_t i = 0; i < tree.level(l).node_count; ++i) out.nodes.push_back(tree.level(l).first_node + i);
+        out.levels.resize(out.nodes.size(), l);
     }
-    for (uint32_t l = 0; l < tree.level_count(); ++l)
-        for (uint32_t i = 0; i < tree.level(l).node_count; ++i) {
-            out.nodes.push_back(tree.level(l).first_node + i);
-            out.levels.push_back(l);
-        }
     return out;
 }
 
@@ -194,10 +201,14 @@ int run(const ExportArguments& a) {
     if (a.level && *a.level >= view.level_count())
         return complain(kUsage, "--level", fmt::format("the tree has no level {}", *a.level),
                         fmt::format("its levels are 0 to {}", view.level_count() - 1));
-    if (format == "ply")
-        return write_output(a.output, as_ply(view, select(view, a.level.value_or(view.level_count() - 1))));
-    const Selection selection = select(view, a.level);
-    return write_output(a.output, format == "csv" ? as_csv(view, selection) : as_json(view, selection));
+    const auto cut = [&view](uint32_t level) {
+        Selection out;
+        add_cut(view, level, out);
+        return out;
+    };
+    if (format == "ply") return write_output(a.output, as_ply(view, cut(a.level.value_or(view.level_count() - 1))));
+    if (format == "csv") return write_output(a.output, as_csv(view, a.level ? cut(*a.level) : all_cuts(view)));
+    return write_output(a.output, as_json(view, a.level ? cut(*a.level) : all_nodes(view)));
 }
 
 } // namespace

@@ -75,7 +75,10 @@ Result<Tree> load(const char* path) {
     return Tree::open(std::move(bytes));
 }
 
-Result<void> save(const char* path, std::span<const std::byte> bytes) {
+Result<void> save(const char* given_path, std::span<const std::byte> bytes) {
+    // Behind a symbolic link, its target is replaced and the link kept.
+    const std::unique_ptr<char, decltype(&std::free)> real(::realpath(given_path, nullptr), &std::free);
+    const char* const path = real ? real.get() : given_path;
     struct stat status {};
     if (::stat(path, &status) == 0 && !S_ISREG(status.st_mode)) { // a pipe or device: nothing to replace
         Descriptor device(::open(path, O_WRONLY | O_CLOEXEC));

@@ -456,7 +456,7 @@ TEST_F(Cli, CsvAgreesWithInfoAndCovers) {
     ASSERT_EQ(counts.size(), info["levels"].size());
     const Mesh mesh = peanut(8);
     for (size_t l = 0; l < counts.size(); ++l) {
-        EXPECT_EQ(counts[static_cast<double>(l)], info["levels"][l]["nodes"]);
+        EXPECT_EQ(counts[static_cast<double>(l)], info["levels"][l]["cut"]);
         const std::string path = file("level" + std::to_string(l) + ".csv");
         ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", path, "--level", std::to_string(l)}).code, 0);
         const auto rows = parse_csv(read(path));
