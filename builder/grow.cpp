@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <mutex>
 #include <numeric>
 #include <set>
@@ -24,7 +25,7 @@ public:
         std::vector<uint32_t> all(voxels_.cell_count());
         std::iota(all.begin(), all.end(), 0u);
         const Fit root = fit_cells(voxels_, all, options_.split.min_radius);
-        add({root, std::move(all)}, 0);
+        add({root, std::move(all)}, 0, 0);
 
         const BuildOptions& goal = options_.build;
         if (goal.ellipsoids)
@@ -54,9 +55,10 @@ private:
         return out;
     }
 
-    void add(Cluster cluster, uint32_t level) {
+    void add(Cluster cluster, uint32_t level, uint32_t parent) {
         GrownNode node;
         node.level = level;
+        node.parent = parent;
         node.outside = outside_volume(cluster.fit, voxels_);
         node.surface_error = surface_error(cluster.fit, voxels_, cluster.cells);
         node.cluster = std::move(cluster);
@@ -110,7 +112,7 @@ private:
             const uint32_t level = grown_.nodes[parents[i]].level + 1;
             grown_.nodes[parents[i]].first_child = static_cast<uint32_t>(grown_.nodes.size());
             grown_.nodes[parents[i]].child_count = static_cast<uint32_t>(split.clusters.size());
-            for (Cluster& child : children[i].clusters) add(std::move(child), level);
+            for (Cluster& child : children[i].clusters) add(std::move(child), level, parents[i]);
             deepest = std::max(deepest, level);
         }
         if (grown_.seconds.size() <= deepest) grown_.seconds.resize(deepest + 1);
@@ -126,8 +128,84 @@ private:
                 grown_.goal_reached = false; // no leaf can be improved
                 return;
             }
+            const auto before = static_cast<uint32_t>(grown_.nodes.size());
             split_all(parents, std::vector<uint32_t>(parents.size(), options_.build.degree),
-                      [&](double done) { return (level + done) / levels; });
+                      [&](double done) { return (level + done / 2) / levels; });
+            if (level > 0) optimise_level(before, [&](double done) { return (level + 0.5 + done / 2) / levels; });
+        }
+    }
+
+    // The nodes from `first` on, all of one level, once more together: now each sees the others' volume, not only its
+    // siblings', and may own any cell that its parent's ellipsoid holds and its parent might have owned. That is still
+    // a hierarchy: cells move with their node from one parent to another, and every ancestor covers what it is given.
+    template <class Share> void optimise_level(uint32_t first, Share&& share) {
+        const auto end = static_cast<uint32_t>(grown_.nodes.size());
+        if (end - first < 2 || cancelled()) return;
+        const auto start = Clock::now();
+        std::vector<uint32_t> cells;
+        std::vector<Cluster> clusters;
+        for (uint32_t n = first; n < end; ++n) {
+            clusters.push_back(grown_.nodes[n].cluster);
+            cells.insert(cells.end(), clusters.back().cells.begin(), clusters.back().cells.end());
+        }
+        std::sort(cells.begin(), cells.end());
+        std::map<uint32_t, std::vector<uint32_t>> by_parent;
+        std::vector<Domain> domains;
+        for (uint32_t n = first; n < end; ++n) {
+            const auto [domain, fresh] = by_parent.try_emplace(grown_.nodes[n].parent);
+            if (fresh) domain->second = held_by_ancestors(n, cells);
+            domains.push_back(domain->second);
+        }
+        SplitOptions own = options_.split;
+        own.seed = Random(own.seed + first).bits();
+        own.progress = [&](double done) {
+            if (options_.progress) options_.progress(share(done), end);
+        };
+        Split joint = optimise(voxels_, cells, clusters, domains, own);
+        if (!cancelled()) replace(first, std::move(joint.clusters));
+        grown_.seconds.back() += std::chrono::duration<double>(Clock::now() - start).count();
+    }
+
+    // Positions of the cells that every ancestor of `node` covers.
+    std::vector<uint32_t> held_by_ancestors(uint32_t node, std::span<const uint32_t> cells) const {
+        std::vector<uint32_t> out(cells.size());
+        std::iota(out.begin(), out.end(), 0u);
+        while (node != 0) {
+            node = grown_.nodes[node].parent;
+            const Cluster& ancestor = grown_.nodes[node].cluster;
+            std::erase_if(out, [&](uint32_t c) {
+                return !std::binary_search(ancestor.cells.begin(), ancestor.cells.end(), cells[c]) &&
+                       ancestor.fit.reach(voxels_.points(cells[c])) > 1;
+            });
+        }
+        return out;
+    }
+
+    // Gives the nodes from `first` on, all leaves of one level, new clusters, drops those without cells, and lets their
+    // ancestors own what they own. Does nothing if a parent would lose all of its children.
+    void replace(uint32_t first, std::vector<Cluster> clusters) {
+        std::map<uint32_t, std::vector<size_t>> kept; // by parent
+        for (size_t i = 0; i < clusters.size(); ++i) {
+            std::vector<size_t>& children = kept[grown_.nodes[first + i].parent];
+            if (!clusters[i].cells.empty()) children.push_back(i);
+        }
+        for (const auto& [parent, children] : kept)
+            if (children.empty()) return;
+        const uint32_t level = grown_.nodes[first].level;
+        grown_.nodes.resize(first);
+        for (const auto& [parent, children] : kept) {
+            grown_.nodes[parent].first_child = static_cast<uint32_t>(grown_.nodes.size());
+            grown_.nodes[parent].child_count = static_cast<uint32_t>(children.size());
+            for (const size_t i : children) add(std::move(clusters[i]), level, parent);
+        }
+        for (uint32_t n = first; n-- > 0;) { // children come after their parents
+            GrownNode& node = grown_.nodes[n];
+            if (node.child_count == 0) continue;
+            node.cluster.cells.clear();
+            for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c)
+                node.cluster.cells.insert(node.cluster.cells.end(), grown_.nodes[c].cluster.cells.begin(),
+                                          grown_.nodes[c].cluster.cells.end());
+            std::sort(node.cluster.cells.begin(), node.cluster.cells.end());
         }
     }
 

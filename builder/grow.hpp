@@ -14,6 +14,7 @@ namespace prolate {
 struct GrownNode {
     Cluster cluster;
     uint32_t level = 0;
+    uint32_t parent = 0;                       ///< of the root: itself
     uint32_t first_child = 0, child_count = 0; ///< indices into the same array
     double outside = 0;                        ///< E_vol, cubic metres
     double surface_error = 0;                  ///< E_sur, metres

@@ -115,9 +115,9 @@ private:
 class Optimiser {
 public:
     Optimiser(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
-              const SplitOptions& options)
-        : voxels_(voxels), cells_(cells), options_(options), random_(options.seed), coverage_(voxels, cells),
-          holders_(cells.size(), 0) {
+              std::span<const Domain> domains, const SplitOptions& options)
+        : voxels_(voxels), cells_(cells), domains_(domains), options_(options), random_(options.seed),
+          coverage_(voxels, cells), holders_(cells.size(), 0) {
         for (const Cluster& cluster : clusters) {
             fits_.push_back(cluster.fit);
             holds_.emplace_back();
@@ -135,6 +135,7 @@ public:
             const double reward = kFirstReward * std::max(0.0, 1 - 1.5 * at / std::max(1, cycle - 1));
             for (size_t i = 0; i < fits_.size(); ++i) improve(i, reward);
             keep_best();
+            if (options_.progress) options_.progress((sweep + 1.0) / options_.sweeps);
         }
         fits_ = best_;
     }
@@ -145,21 +146,17 @@ public:
             exclude(i); // fits_ may have been exchanged: recompute who holds what
             include(i);
         }
-        Split out;
-        std::vector<Cluster>& clusters = out.clusters;
-        clusters.resize(fits_.size());
-        for (size_t i = 0; i < fits_.size(); ++i) clusters[i].fit = fits_[i];
-        for (size_t c = 0; c < cells_.size(); ++c) {
-            size_t owner = fits_.size();
-            double nearest = HUGE_VAL;
-            for (size_t i = 0; i < fits_.size(); ++i) {
-                if (!holds_[i][c]) continue;
+        std::vector<size_t> owner(cells_.size(), fits_.size());
+        std::vector<double> nearest(cells_.size(), HUGE_VAL);
+        for (size_t i = 0; i < fits_.size(); ++i)
+            for_each_held(i, [&](uint32_t c) {
                 const double radial = fits_[i].radial_squared(voxels_.center(cells_[c]));
-                if (radial < nearest) nearest = radial, owner = i;
-            }
-            clusters[owner].cells.push_back(cells_[c]);
-        }
-        std::erase_if(clusters, [](const Cluster& cluster) { return cluster.cells.empty(); });
+                if (radial < nearest[c]) nearest[c] = radial, owner[c] = i;
+            });
+        Split out;
+        out.clusters.resize(fits_.size());
+        for (size_t i = 0; i < fits_.size(); ++i) out.clusters[i].fit = fits_[i];
+        for (size_t c = 0; c < cells_.size(); ++c) out.clusters[owner[c]].cells.push_back(cells_[c]);
         out.outside = union_outside();
         return out;
     }
@@ -177,18 +174,23 @@ private:
 
     void include(size_t i) {
         const double shortest_inverse = fits_[i].inverse.norm();
-        holds_[i].resize(cells_.size());
-        for (size_t c = 0; c < cells_.size(); ++c) {
-            holds_[i][c] = holds(fits_[i], shortest_inverse, cells_[c]);
-            holders_[c] = static_cast<uint16_t>(holders_[c] + holds_[i][c]);
+        holds_[i].resize(domains_[i].size());
+        for (size_t d = 0; d < domains_[i].size(); ++d) {
+            const uint32_t c = domains_[i][d];
+            holds_[i][d] = holds(fits_[i], shortest_inverse, cells_[c]);
+            holders_[c] = static_cast<uint16_t>(holders_[c] + holds_[i][d]);
         }
         coverage_.add(fits_[i], +1);
         included_.resize(fits_.size());
         included_[i] = fits_[i];
     }
     void exclude(size_t i) {
-        for (size_t c = 0; c < cells_.size(); ++c) holders_[c] = static_cast<uint16_t>(holders_[c] - holds_[i][c]);
+        for_each_held(i, [&](uint32_t c) { --holders_[c]; });
         coverage_.add(included_[i], -1);
+    }
+    template <class Visit> void for_each_held(size_t i, Visit&& visit) const {
+        for (size_t d = 0; d < holds_[i].size(); ++d)
+            if (holds_[i][d]) visit(domains_[i][d]);
     }
 
     double error_of(const Fit& fit, std::span<const Vec> samples, double reward, double* added = nullptr) const {
@@ -201,8 +203,8 @@ private:
 
     void improve(size_t i, double reward) {
         exclude(i);
-        std::vector<uint32_t> alone;
-        for (size_t c = 0; c < cells_.size(); ++c)
+        std::vector<uint32_t> alone; // in its domain: until now it held them
+        for (const uint32_t c : domains_[i])
             if (holders_[c] == 0) alone.push_back(cells_[c]);
         if (alone.empty()) alone = half_of_the_worst(i);
         if (!alone.empty()) fits_[i] = search(fits_[i], alone, reward, added_[i]);
@@ -217,8 +219,10 @@ private:
         if (worst == redundant) return {};
         std::vector<uint32_t> own;
         Vec mean = Vec::Zero();
-        for (size_t c = 0; c < cells_.size(); ++c)
-            if (holds_[worst][c] && holders_[c] == 1) own.push_back(cells_[c]), mean += voxels_.center(cells_[c]);
+        for_each_held(worst, [&](uint32_t c) {
+            if (holders_[c] == 1 && std::binary_search(domains_[redundant].begin(), domains_[redundant].end(), c))
+                own.push_back(cells_[c]), mean += voxels_.center(cells_[c]);
+        });
         if (own.size() < 2) return own;
         mean /= static_cast<double>(own.size());
         int longest = 0; // column of L with most weight: the factor's last rows mix, so take the widest box side
@@ -308,11 +312,11 @@ private:
 
     void keep_best() {
         std::vector<std::vector<uint32_t>> own(fits_.size()); // for E_sur: each cell counts once
-        for (size_t c = 0; c < cells_.size(); ++c) {
-            size_t first = 0;
-            while (!holds_[first][c]) ++first;
-            own[first].push_back(cells_[c]);
-        }
+        std::vector<bool> taken(cells_.size(), false);
+        for (size_t i = 0; i < fits_.size(); ++i)
+            for_each_held(i, [&](uint32_t c) {
+                if (!taken[c]) taken[c] = true, own[i].push_back(cells_[c]);
+            });
         double error = 0;
         union_outside(
             [&](size_t i, double added) { error += options_.error(surface_error(fits_[i], voxels_, own[i]), added); });
@@ -323,21 +327,22 @@ private:
 
     const Voxels& voxels_;
     std::span<const uint32_t> cells_;
+    std::span<const Domain> domains_;
     const SplitOptions& options_;
     Random random_;
     Coverage coverage_;
     std::vector<Fit> fits_, included_, best_;
     double best_error_ = HUGE_VAL;
     std::vector<double> added_;               // volume that each ellipsoid adds outside
-    std::vector<std::vector<uint8_t>> holds_; // [ellipsoid][cell]
+    std::vector<std::vector<uint8_t>> holds_; // [ellipsoid][index in its domain]
     std::vector<uint16_t> holders_;           // how many ellipsoids hold each cell: at least one between updates
 };
 
 } // namespace
 
 Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
-               const SplitOptions& options) {
-    Optimiser optimiser(voxels, cells, clusters, options);
+               std::span<const Domain> domains, const SplitOptions& options) {
+    Optimiser optimiser(voxels, cells, clusters, domains, options);
     if (clusters.size() > 1) optimiser.run();
     return optimiser.assign();
 }

@@ -1,6 +1,7 @@
 #include "builder/split.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 namespace prolate {
 
@@ -42,7 +43,12 @@ Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> all, double min_ra
 }
 
 Split split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, const SplitOptions& options) {
-    return optimise(voxels, cells, merge_pieces(voxels, cells, k, options), options);
+    const std::vector<Cluster> merged = merge_pieces(voxels, cells, k, options);
+    std::vector<uint32_t> everything(cells.size());
+    std::iota(everything.begin(), everything.end(), 0u);
+    Split out = optimise(voxels, cells, merged, std::vector<Domain>(merged.size(), everything), options);
+    std::erase_if(out.clusters, [](const Cluster& cluster) { return cluster.cells.empty(); });
+    return out;
 }
 
 } // namespace prolate

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -22,7 +23,8 @@ struct SplitOptions {
     int sweeps;        ///< of the variational optimisation
     int trials;        ///< proposals an ellipsoid and sweep
     uint64_t seed;
-    const std::atomic<bool>* cancelled; ///< checked between sweeps; then the result is to be thrown away
+    const std::atomic<bool>* cancelled;        ///< checked between sweeps; then the result is to be thrown away
+    std::function<void(double)> progress = {}; ///< called after each sweep with the share that is done
 };
 
 /// Ellipsoid around the points of `cells`, to a tight tolerance: sketch, fit, and refit with what sticks out.
@@ -39,12 +41,15 @@ struct Split {
     double outside = 0; ///< volume of (union of their ellipsoids \ solid)
 };
 
-/// Step 7: lowers the error of `clusters`, which partition `cells`, by moving and reshaping one ellipsoid at a time.
-/// The result partitions them too, without the clusters that nothing is left for.
-Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
-               const SplitOptions& options);
+/// The cells that an ellipsoid may hold, as rising positions in a list of cells.
+using Domain = std::span<const uint32_t>;
 
-/// Steps 6 and 7: up to k clusters.
+/// Step 7: lowers the error of `clusters`, which partition `cells`, by moving and reshaping one ellipsoid at a time.
+/// The result partitions them too, cluster i within domains[i]; clusters that nothing is left for come back empty.
+Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
+               std::span<const Domain> domains, const SplitOptions& options);
+
+/// Steps 6 and 7: up to k clusters, none empty.
 Split split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, const SplitOptions& options);
 
 } // namespace prolate
