@@ -129,12 +129,13 @@ private:
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
         resolution_ = effort_.resolution;
         for (;;) {
-            Voxels voxels(mesh_, closed_, winding, resolution_, 0, 0);
+            Voxels voxels(mesh_, closed_, winding, resolution_);
             const double wanted = kCellsPerLeaf * expected_leaves();
             const double cells = voxels.cell_count();
             if (cells >= wanted || resolution_ == kMaxResolution) {
                 const auto samples = static_cast<uint32_t>(std::min(cells * kSamplesPerCell, 4e6));
-                return {mesh_, closed_, winding, resolution_, samples, options_.seed};
+                voxels.sample_surface(mesh_, samples, options_.seed);
+                return voxels;
             }
             // Cells grow with the square (surface) to the cube (volume) of the resolution.
             const double grow = std::clamp(std::sqrt(wanted / cells), 1.05, 2.0);

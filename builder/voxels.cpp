@@ -22,8 +22,7 @@ bool before(const Vec& a, const Vec& b) {
 
 } // namespace
 
-Voxels::Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t resolution, uint32_t samples,
-               uint64_t seed) {
+Voxels::Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t resolution) {
     Box box;
     for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
     pitch_ = box.size().maxCoeff() / resolution;
@@ -33,7 +32,7 @@ Voxels::Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t reso
         size_[a] = static_cast<int>(std::ceil((box.high[int(a)] - origin_[int(a)]) / pitch_)) + 1;
     measure_fractions(mesh, closed, winding);
     collect_cells(mesh, closed, winding);
-    sample_surface(mesh, samples, seed);
+    sample_begin_.assign(cell_count() + 1, 0);
 }
 
 void Voxels::measure_fractions(MeshView mesh, bool closed, const Winding& winding) {

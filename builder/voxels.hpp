@@ -24,15 +24,18 @@ class Voxels {
 public:
     static constexpr uint32_t kNoCell = UINT32_MAX;
 
-    /// `resolution` cells along the longest side of the mesh's box, `samples` surface points from `seed`.
-    Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t resolution, uint32_t samples, uint64_t seed);
+    /// `resolution` cells along the longest side of the mesh's box. No surface samples yet.
+    Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t resolution);
+
+    /// Replaces the surface samples by about `count` new ones (paper's P_s), area-uniform.
+    void sample_surface(MeshView mesh, uint32_t count, uint64_t seed);
 
     /// Cells that hold a part of the solid: 0 ... cell_count() - 1, in raster order.
     uint32_t cell_count() const { return static_cast<uint32_t>(coordinates_.size()); }
     std::span<const Vec> points(uint32_t cell) const {
         return {points_.data() + point_begin_[cell], point_begin_[cell + 1] - point_begin_[cell]};
     }
-    /// Surface samples in the cell (paper's P_s).
+    /// Surface samples in the cell.
     std::span<const Vec> samples(uint32_t cell) const {
         return {samples_.data() + sample_begin_[cell], sample_begin_[cell + 1] - sample_begin_[cell]};
     }
@@ -82,7 +85,6 @@ private:
     void clip_triangles(MeshView mesh, std::vector<std::pair<uint32_t, Vec>>& pieces) const;
     void measure_fractions(MeshView mesh, bool closed, const Winding& winding);
     void collect_cells(MeshView mesh, bool closed, const Winding& winding);
-    void sample_surface(MeshView mesh, uint32_t count, uint64_t seed);
 
     Vec origin_;
     double pitch_ = 0;

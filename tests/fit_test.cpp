@@ -86,7 +86,7 @@ TEST(Sketch, MergesLikeTheUnion) {
 TEST(Cover, DecodedNodesCoverWithLittleWaste) {
     const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
     const Winding winding(mesh.view());
-    const Voxels voxels(mesh.view(), true, winding, 24, 1000, 1);
+    const Voxels voxels(mesh.view(), true, winding, 24);
     const double low[3] = {-1.5, -1.5, -0.5}, high[3] = {1.5, 1.5, 0.5};
     const format::Lattice lattice = format::lattice_for(low, high);
     Random random(5);

@@ -133,7 +133,7 @@ TEST(Voxels, AnEllipsoidAroundThePointsCoversThePiece) {
     Mesh thin = shapes::box(1, 1, 0.01f); // thinner than a cell
     shapes::append(thin, shapes::moved(shapes::torus(0.3f, 0.05f, 30, 12), {0.5f, 0.5f, 0.4f}));
     const Winding winding(thin.view());
-    const Voxels voxels(thin.view(), true, winding, 16, 500, 1);
+    const Voxels voxels(thin.view(), true, winding, 16);
     Random random(9);
     int tested = 0;
     for (int round = 0; round < 200'000; ++round) {
@@ -156,7 +156,8 @@ TEST(Voxels, AnEllipsoidAroundThePointsCoversThePiece) {
 
 TEST(Voxels, FractionsAndSamplesAddUp) {
     const Mesh mesh = shapes::torus(1, 0.3f, 64, 32);
-    const Voxels voxels(mesh.view(), true, Winding(mesh.view()), 40, 5000, 1);
+    Voxels voxels(mesh.view(), true, Winding(mesh.view()), 40);
+    voxels.sample_surface(mesh.view(), 5000, 1);
     const double exact = shapes::enclosed_volume(mesh);
     EXPECT_NEAR(voxels.solid_volume(), exact, 2e-3 * exact);
     double sum = 0;
@@ -173,7 +174,7 @@ TEST(Voxels, FractionsAndSamplesAddUp) {
 
 TEST(OutsideVolume, OfEllipsoidsAroundABall) {
     const Mesh ball = shapes::icosphere(4);
-    const Voxels voxels(ball.view(), true, Winding(ball.view()), 64, 2000, 1);
+    const Voxels voxels(ball.view(), true, Winding(ball.view()), 64);
     const double inner = shapes::enclosed_volume(ball);
     for (const double stretch : {1.01, 1.5, 3.0}) {
         const Fit fit(Vec::Zero(), Vec(stretch, 1.01, 1.2).asDiagonal().toDenseMatrix());
