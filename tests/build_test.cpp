@@ -63,10 +63,18 @@ void expect_proved(const Mesh& mesh, const Build& built) {
     for (const LevelReport& level : built.levels) EXPECT_TRUE(level.covered);
 }
 
-class BuildOf : public testing::TestWithParam<std::pair<const char*, Mesh>> {};
+struct Model {
+    const char* name;
+    Mesh mesh;
+};
+void PrintTo(const Model& model, std::ostream* out) {
+    *out << model.name;
+}
+
+class BuildOf : public testing::TestWithParam<Model> {};
 
 TEST_P(BuildOf, CoversEveryLevel) {
-    const Mesh& mesh = GetParam().second;
+    const Mesh& mesh = GetParam().mesh;
     const Build built = must_build(mesh, quick());
     EXPECT_EQ(built.levels.size(), built.tree.view().level_count());
     expect_proved(mesh, built);
@@ -107,18 +115,18 @@ Mesh dust() { // more separate parts than initial pieces
 
 INSTANTIATE_TEST_SUITE_P(
     Meshes, BuildOf,
-    testing::Values(std::pair{"torus", shapes::torus(1, 0.3f, 48, 24)}, std::pair{"box", shapes::box(1, 2, 3)},
-                    std::pair{"tetrahedron", shapes::tetrahedron()},
-                    std::pair{"inside_out", shapes::inverted(shapes::icosphere(3))}, std::pair{"hollow", hollow_ball()},
-                    std::pair{"two_pieces", two_pieces()},
-                    std::pair{"plate", shapes::box(1, 1, 0.001f)}, // far thinner than a cell
-                    std::pair{"needle", shapes::box(1, 0.001f, 0.001f)}, std::pair{"sheet", shapes::sheet(1, 1, 8)},
-                    std::pair{"open_box", open_box()}, std::pair{"dust", dust()},
-                    std::pair{"one_triangle", Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}},
-                    std::pair{"micrometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e-6f)},
-                    std::pair{"kilometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e6f)},
-                    std::pair{"far_away", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {1e4f, -1e4f, 5e3f})}),
-    [](const auto& mesh) { return std::string(mesh.param.first); });
+    testing::Values(Model{"torus", shapes::torus(1, 0.3f, 48, 24)}, Model{"box", shapes::box(1, 2, 3)},
+                    Model{"tetrahedron", shapes::tetrahedron()},
+                    Model{"inside_out", shapes::inverted(shapes::icosphere(3))}, Model{"hollow", hollow_ball()},
+                    Model{"two_pieces", two_pieces()},
+                    Model{"plate", shapes::box(1, 1, 0.001f)}, // far thinner than a cell
+                    Model{"needle", shapes::box(1, 0.001f, 0.001f)}, Model{"sheet", shapes::sheet(1, 1, 8)},
+                    Model{"open_box", open_box()}, Model{"dust", dust()},
+                    Model{"one_triangle", Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}},
+                    Model{"micrometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e-6f)},
+                    Model{"kilometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e6f)},
+                    Model{"far_away", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {1e4f, -1e4f, 5e3f})}),
+    [](const auto& model) { return std::string(model.param.name); });
 
 TEST(Build, SurfaceModeIsAnnounced) {
     EXPECT_TRUE(must_build(open_box(), quick(1)).surface_mode);
