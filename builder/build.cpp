@@ -27,20 +27,20 @@ double seconds_since(Clock::time_point start) {
 }
 
 struct Effort {
-    uint32_t resolution; // cells along the longest side, at least
-    int sweeps, trials;
+    uint32_t resolution;        // cells along the longest side, at least
+    int sweeps, trials, starts; // see SplitOptions
 };
 
 Effort effort_of(Quality quality) {
     switch (quality) {
     case Quality::fast:
-        return {64, 4, 12};
+        return {64, 4, 12, 1};
     case Quality::normal:
-        return {96, 10, 32};
+        return {96, 10, 32, 4};
     case Quality::best:
-        return {128, 20, 80};
+        return {128, 20, 80, 8};
     }
-    return {96, 10, 32};
+    return {96, 10, 32, 4};
 }
 
 constexpr uint32_t kMaxResolution = 320;
@@ -150,6 +150,7 @@ private:
                          kSmallestRadius * box_.size().norm(),
                          effort_.sweeps,
                          effort_.trials,
+                         effort_.starts,
                          options_.seed,
                          &cancelled_};
         options.outside_ratio = [&](const std::vector<Fit>& fits) {

@@ -111,6 +111,15 @@ Fit capped(const Vec& center, const Mat& q, double min_radius) {
     return {center, cholesky(widened)};
 }
 
+bool within_caps(const Fit& fit, double min_radius) {
+    // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
+    const double inverse = fit.inverse.norm();
+    if (fit.factor.norm() * inverse <= kMaxAxisRatio && inverse * min_radius <= 1) return true;
+    const Eigen3x3 axes = eigen_of(fit.factor * fit.factor.transpose());
+    return axes.values[2] * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] &&
+           axes.values[2] >= min_radius * min_radius;
+}
+
 Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double tolerance) {
     const std::vector<Vec> points = with_thickness(input, min_radius);
     const size_t n = points.size();

@@ -45,6 +45,9 @@ struct Fit {
 /// its radii up to `min_radius` by lengthening short axes.
 Fit capped(const Vec& center, const Mat& q, double min_radius);
 
+/// Does `fit` keep to those bounds?
+bool within_caps(const Fit& fit, double min_radius);
+
 /// Minimum-volume ellipsoid around `points` (any number above 0, also coplanar or equal ones), capped, to a relative
 /// error of about `tolerance` in radius. It contains the points up to rounding.
 /// Khachiyan's algorithm with away steps (Todd and Yildirim 2007). O(n) an iteration: give it a core set.

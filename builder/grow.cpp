@@ -89,6 +89,8 @@ private:
                     const std::vector<uint32_t>& cells = grown_.nodes[parents[i]].cluster.cells;
                     SplitOptions own = options_.split;
                     own.seed = Random(own.seed + parents[i]).bits();
+                    // At the root a bad start costs most, and it has all the threads.
+                    if (parents.size() > 1) own.starts = (own.starts + 1) / 2;
                     children[i] = split(voxels_, cells, degrees[i], own);
                     const std::lock_guard lock(reporting);
                     ++done, done_cells += cells.size(), made += static_cast<uint32_t>(children[i].clusters.size());

@@ -2,7 +2,7 @@
 // reference [16], whose text gives no details; m, the cost and the neighbourhood below are ours).
 //
 // Start: the connected parts of the sub-volume in each block of b x b x b cells, b as small as keeps m below
-// kPiecesPerChild * k. Merging: always the pair of touching pieces whose union adds least error. A piece keeps a
+// pieces_per_child * k. Merging: always the pair of touching pieces whose union adds least error. A piece keeps a
 // support sketch, so that an ellipsoid around a union costs the same whatever its size. When no two touching pieces are
 // left (several components), any two pieces may merge.
 #include "builder/split.hpp"
@@ -17,7 +17,6 @@
 namespace prolate {
 namespace {
 
-constexpr size_t kPiecesPerChild = 16;
 constexpr size_t kSamplesPerPiece = 64; // for E_sur while merging
 constexpr double kFitTolerance = 2e-2;  // merging ranks pairs; the result is refitted
 constexpr size_t kAllPairsLimit = 400;  // pieces up to which components may pair up freely
@@ -160,9 +159,9 @@ private:
 } // namespace
 
 std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
-                                  const SplitOptions& options) {
+                                  uint32_t pieces_per_child, const SplitOptions& options) {
     const Neighbourhood neighbourhood(voxels, cells);
-    const size_t most = kPiecesPerChild * k;
+    const size_t most = size_t{pieces_per_child} * k;
     std::vector<uint32_t> label;
     uint32_t count = 0;
     const int longest = *std::max_element(voxels.size().begin(), voxels.size().end());

@@ -13,8 +13,6 @@
 #include "builder/random.hpp"
 #include "builder/split.hpp"
 
-#include "src/symmetric3.hpp"
-
 #include <algorithm>
 
 namespace prolate {
@@ -22,18 +20,6 @@ namespace {
 
 constexpr size_t kSurfaceSamples = 128; // per ellipsoid, for E_sur during a search
 constexpr double kFirstReward = 0.1;    // per volume inside the solid, against 1 per volume outside
-
-bool ratio_allowed(const Fit& fit, double min_radius) {
-    // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
-    if (fit.factor.norm() * fit.inverse.norm() <= kMaxAxisRatio && fit.inverse.norm() * min_radius <= 1) return true;
-    const Mat q = fit.factor * fit.factor.transpose();
-    Matrix3 a;
-    for (size_t i = 0; i < 3; ++i)
-        for (size_t j = 0; j < 3; ++j) a[i][j] = q(int(i), int(j));
-    const Eigen3x3 axes = eigen_symmetric(a);
-    return axes.values[2] * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] &&
-           axes.values[2] >= min_radius * min_radius;
-}
 
 // Cells of the voxel grid that some ellipsoid of the set covers, on a window around the node.
 class Coverage {
@@ -128,7 +114,8 @@ public:
 
     void run() {
         keep_best();
-        for (int sweep = 0; sweep < options_.sweeps; ++sweep) {
+        const int sweeps = fits_.size() > 1 ? options_.sweeps : 0; // one alone is fitted already
+        for (int sweep = 0; sweep < sweeps; ++sweep) {
             if (options_.cancelled->load(std::memory_order_relaxed)) return;
             // Two annealing cycles; the last third of each is pure.
             const int cycle = (options_.sweeps + 1) / 2, at = sweep % cycle;
@@ -158,6 +145,7 @@ public:
         for (size_t i = 0; i < fits_.size(); ++i) out.clusters[i].fit = fits_[i];
         for (size_t c = 0; c < cells_.size(); ++c) out.clusters[owner[c]].cells.push_back(cells_[c]);
         out.outside = union_outside();
+        out.error = best_error_;
         return out;
     }
 
@@ -265,7 +253,7 @@ private:
 
         Fit best = tightened(fresh);
         double best_error = error_of(best, samples, reward);
-        if (const Fit old = tightened(current); ratio_allowed(old, options_.min_radius)) {
+        if (const Fit old = tightened(current); within_caps(old, options_.min_radius)) {
             const double error = error_of(old, samples, reward);
             if (error < best_error) best = old, best_error = error;
         }
@@ -276,7 +264,7 @@ private:
                 for (int c = 0; c <= r; ++c) change(r, c) += step * random_.symmetric();
             const Vec shift = step * Vec(random_.symmetric(), random_.symmetric(), random_.symmetric());
             const Fit proposal = tightened({best.center + best.factor * shift, Mat(best.factor * change)});
-            if (!ratio_allowed(proposal, options_.min_radius)) continue;
+            if (!within_caps(proposal, options_.min_radius)) continue;
             const double error = error_of(proposal, samples, reward);
             if (error < best_error) {
                 best = proposal, best_error = error;
@@ -310,16 +298,18 @@ private:
         return union_outside([](size_t, double) {});
     }
 
+    // The hybrid error of the set. A cell of the surface corresponds to the holder whose border it is nearest to.
     void keep_best() {
-        std::vector<std::vector<uint32_t>> own(fits_.size()); // for E_sur: each cell counts once
-        std::vector<bool> taken(cells_.size(), false);
+        std::vector<double> distance(cells_.size(), HUGE_VAL), surface(fits_.size(), 0);
+        std::vector<size_t> nearest(cells_.size(), 0);
         for (size_t i = 0; i < fits_.size(); ++i)
             for_each_held(i, [&](uint32_t c) {
-                if (!taken[c]) taken[c] = true, own[i].push_back(cells_[c]);
+                const double own = surface_error(fits_[i], voxels_, {&cells_[c], 1});
+                if (own < distance[c]) distance[c] = own, nearest[c] = i;
             });
+        for (size_t c = 0; c < cells_.size(); ++c) surface[nearest[c]] = std::max(surface[nearest[c]], distance[c]);
         double error = 0;
-        union_outside(
-            [&](size_t i, double added) { error += options_.error(surface_error(fits_[i], voxels_, own[i]), added); });
+        union_outside([&](size_t i, double added) { error += options_.error(surface[i], added); });
         if (best_.empty() || error < best_error_) best_ = fits_, best_error_ = error;
     }
 
@@ -343,7 +333,7 @@ private:
 Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
                std::span<const Domain> domains, const SplitOptions& options) {
     Optimiser optimiser(voxels, cells, clusters, domains, options);
-    if (clusters.size() > 1) optimiser.run();
+    optimiser.run();
     return optimiser.assign();
 }
 

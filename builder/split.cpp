@@ -1,6 +1,9 @@
 #include "builder/split.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 
 namespace prolate {
@@ -43,12 +46,21 @@ Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> all, double min_ra
 }
 
 Split split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, const SplitOptions& options) {
-    const std::vector<Cluster> merged = merge_pieces(voxels, cells, k, options);
+    constexpr uint32_t kPiecesPerChild[] = {16, 8, 32, 12};
     std::vector<uint32_t> everything(cells.size());
     std::iota(everything.begin(), everything.end(), 0u);
-    Split out = optimise(voxels, cells, merged, std::vector<Domain>(merged.size(), everything), options);
-    std::erase_if(out.clusters, [](const Cluster& cluster) { return cluster.cells.empty(); });
-    return out;
+    std::vector<Split> tries(static_cast<size_t>(options.starts));
+    tbb::parallel_for(size_t{0}, tries.size(), [&](size_t start) {
+        SplitOptions own = options;
+        own.seed += start;
+        const std::vector<Cluster> merged =
+            merge_pieces(voxels, cells, k, kPiecesPerChild[start % std::size(kPiecesPerChild)], own);
+        tries[start] = optimise(voxels, cells, merged, std::vector<Domain>(merged.size(), everything), own);
+    });
+    Split best = std::move(*std::min_element(tries.begin(), tries.end(),
+                                             [](const Split& a, const Split& b) { return a.error < b.error; }));
+    std::erase_if(best.clusters, [](const Cluster& cluster) { return cluster.cells.empty(); });
+    return best;
 }
 
 } // namespace prolate

@@ -22,6 +22,7 @@ struct SplitOptions {
     double min_radius; ///< metres; keeps flat parts from flat ellipsoids
     int sweeps;        ///< of the variational optimisation
     int trials;        ///< proposals an ellipsoid and sweep
+    int starts;        ///< different starts that split() tries
     uint64_t seed;
     const std::atomic<bool>* cancelled;        ///< checked between sweeps; then the result is to be thrown away
     std::function<void(double)> progress = {}; ///< called after each sweep with the share that is done
@@ -30,15 +31,16 @@ struct SplitOptions {
 /// Ellipsoid around the points of `cells`, to a tight tolerance: sketch, fit, and refit with what sticks out.
 Fit fit_cells(const Voxels& voxels, std::span<const uint32_t> cells, double min_radius);
 
-/// Step 6: m >> k connected blocks of cells, merged pairwise by the least growth of the error until k are left.
-/// O(m log m) merges. Fewer than k clusters only if there are fewer cells.
+/// Step 6: m >> k connected blocks of cells, at most `pieces_per_child` * k, merged pairwise by the least growth of the
+/// error until k are left. O(m log m) merges. Fewer than k clusters only if there are fewer cells.
 std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
-                                  const SplitOptions& options);
+                                  uint32_t pieces_per_child, const SplitOptions& options);
 
 /// Clusters that partition the cells of a node.
 struct Split {
     std::vector<Cluster> clusters;
     double outside = 0; ///< volume of (union of their ellipsoids \ solid)
+    double error = 0;   ///< hybrid error of the set
 };
 
 /// The cells that an ellipsoid may hold, as rising positions in a list of cells.
@@ -49,7 +51,8 @@ using Domain = std::span<const uint32_t>;
 Split optimise(const Voxels& voxels, std::span<const uint32_t> cells, const std::vector<Cluster>& clusters,
                std::span<const Domain> domains, const SplitOptions& options);
 
-/// Steps 6 and 7: up to k clusters, none empty.
+/// Steps 6 and 7, from options.starts different numbers of pieces and seeds, of which the best is kept, because the
+/// optimisation is local: up to k clusters, none empty.
 Split split(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, const SplitOptions& options);
 
 } // namespace prolate

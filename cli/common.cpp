@@ -230,16 +230,6 @@ bool ProgressLine::show(std::string_view stage, double fraction, uint32_t nodes)
     return !interrupted();
 }
 
-std::string grouped(uint64_t number) {
-    const std::string digits = std::to_string(number);
-    std::string out;
-    for (size_t i = 0; i < digits.size(); ++i) {
-        if (i > 0 && (digits.size() - i) % 3 == 0) out += ',';
-        out += digits[i];
-    }
-    return out;
-}
-
 std::string extension(const std::string& path) {
     std::string out = std::filesystem::path(path).extension().string();
     if (!out.empty()) out.erase(0, 1);

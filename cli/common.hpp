@@ -5,6 +5,8 @@
 // no command runs inside the parser.
 #pragma once
 
+#include "cli/grouped.hpp"
+
 #include <prolate/error.hpp>
 #include <prolate/mesh.hpp>
 #include <prolate/tree.hpp>
@@ -96,9 +98,6 @@ private:
     Clock::time_point start_ = Clock::now(), drawn_{};
     bool terminal_ = false, dirty_ = false;
 };
-
-/// 12345678 as "12,345,678".
-std::string grouped(uint64_t number);
 
 /// The extension of a file name in lower case, without the dot: "Out.PLY" -> "ply"; "" if there is none.
 std::string extension(const std::string& path);

@@ -1,4 +1,5 @@
 #include "cli/render_sheet.hpp"
+#include "cli/grouped.hpp"
 
 #include "cli/render_palette.hpp"
 #include "cli/render_text.hpp"
@@ -60,16 +61,9 @@ Layout choose_layout(uint32_t panels, const SheetOptions& o, const Window& shown
     return best;
 }
 
-// 12345678 as "12,345,678".
-std::string grouped_digits(size_t number) {
-    std::string text = std::to_string(number);
-    for (size_t at = text.size(); at > 3;) text.insert(at -= 3, 1, ',');
-    return text;
-}
-
 std::string caption_of(const TreeView& tree, uint32_t level, size_t nodes) {
     const char* shape = tree.bake_info().primitive == Primitive::sphere ? "sphere" : "ellipsoid";
-    std::string text = fmt::format("level {}: {} {}{}", level, grouped_digits(nodes), shape, nodes == 1 ? "" : "s");
+    std::string text = fmt::format("level {}: {} {}{}", level, grouped(nodes), shape, nodes == 1 ? "" : "s");
     const double ratio = tree.level(level).outside_ratio;
     if (std::isfinite(ratio)) text += fmt::format(", outside ratio {:.{}f}", ratio, ratio < 0.1 ? 3 : 2);
     return text;
@@ -153,7 +147,7 @@ std::vector<Panel> make_panels(const TreeView& tree, std::optional<MeshView> mes
     if (mesh)
         panels.push_back({Scene(*mesh, frame),
                           {to_linear_rgb(kNeutral)},
-                          fmt::format("mesh, {} triangles", grouped_digits(mesh->triangles.size()))});
+                          fmt::format("mesh, {} triangles", grouped(mesh->triangles.size()))});
     const std::vector<Oklch> palette = node_colours(tree);
     for (size_t i = 0; i < cuts.size(); ++i) {
         std::vector<dvec3> colours;
