@@ -70,7 +70,7 @@ private:
     void split_all(const std::vector<uint32_t>& parents, const std::vector<uint32_t>& degrees, Share&& share) {
         const auto start = Clock::now();
         std::vector<Split> children(parents.size());
-        size_t done = 0, done_cells = 0, all_cells = 0;
+        size_t done_cells = 0, all_cells = 0;
         for (const uint32_t p : parents) all_cells += grown_.nodes[p].cluster.cells.size();
         auto made = static_cast<uint32_t>(grown_.nodes.size());
         std::mutex reporting;
@@ -91,12 +91,20 @@ private:
                     own.seed = Random(own.seed + parents[i]).bits();
                     // At the root a bad start costs most, and it has all the threads.
                     if (parents.size() > 1) own.starts = (own.starts + 1) / 2;
+                    const auto report = [&](double part_of_this) {
+                        if (!options_.progress) return;
+                        const std::lock_guard lock(reporting);
+                        const double part =
+                            static_cast<double>(done_cells) + part_of_this * static_cast<double>(cells.size());
+                        options_.progress(share(part / static_cast<double>(all_cells)), made);
+                    };
+                    own.progress = report;
                     children[i] = split(voxels_, cells, degrees[i], own);
-                    const std::lock_guard lock(reporting);
-                    ++done, done_cells += cells.size(), made += static_cast<uint32_t>(children[i].clusters.size());
-                    if (options_.progress)
-                        options_.progress(share(static_cast<double>(done_cells) / static_cast<double>(all_cells)),
-                                          made);
+                    {
+                        const std::lock_guard lock(reporting);
+                        done_cells += cells.size(), made += static_cast<uint32_t>(children[i].clusters.size());
+                    }
+                    report(0);
                 }
             },
             tbb::simple_partitioner());
