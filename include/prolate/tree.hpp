@@ -31,7 +31,7 @@ enum class Quality : uint8_t { fast = 0, normal = 1, best = 2 };
 
 /// What the file says of its own making.
 struct BakeInfo {
-    uint64_t source_hash = 0;  ///< XXH3-64 of the welded mesh
+    uint64_t source_hash = 0;  ///< hash(MeshView) of the cleaned mesh
     uint64_t options_hash = 0; ///< hash of the bake options, see hash(BuildOptions)
     bool surface_mode = false; ///< true: the mesh was open, and only its triangles are guaranteed covered
     double solid_volume = 0;   ///< volume of the solid, cubic metres; 0 where there is no inside
