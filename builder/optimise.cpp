@@ -262,7 +262,8 @@ private:
             Mat change = Mat::Identity();
             for (int r = 0; r < 3; ++r)
                 for (int c = 0; c <= r; ++c) change(r, c) += step * random_.symmetric();
-            const Vec shift = step * Vec(random_.symmetric(), random_.symmetric(), random_.symmetric());
+            Vec shift; // one by one: compilers differ in the order of a call's arguments
+            for (double& x : shift) x = step * random_.symmetric();
             const Fit proposal = tightened({best.center + best.factor * shift, Mat(best.factor * change)});
             if (!within_caps(proposal, options_.min_radius)) continue;
             const double error = error_of(proposal, samples, reward);
