@@ -284,10 +284,12 @@ private:
                 continue;
             }
             const auto length = value(*property.length);
-            if (!length || !(*length >= 0)) return bad_text_or_bytes(kTooShort, line_at);
+            constexpr double kMostEntries = 1e9; // no list is longer; more is damage
+            if (!length || !(*length >= 0 && *length <= kMostEntries)) return bad_text_or_bytes(kTooShort, line_at);
             if (property.is_corners && *length < 1) return bad_text_or_bytes(kBadFace, line_at);
             faces_ += property.is_corners && *length >= 3;
-            for (double i = 0; i < *length; ++i) {
+            const auto entries = static_cast<uint64_t>(std::ceil(*length));
+            for (uint64_t i = 0; i < entries; ++i) {
                 const auto index = value(property.value);
                 if (!index) return bad_text_or_bytes(kTooShort, line_at);
                 if (property.is_corners && !(*index >= 0 && *index < static_cast<double>(vertices)))
