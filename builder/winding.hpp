@@ -7,33 +7,41 @@
 // away from the surface.
 #pragma once
 
-#include "builder/eigen.hpp"
+#include "builder/triangle_tree.hpp"
 
-#include <prolate/mesh.hpp>
-
+#include <optional>
+#include <span>
 #include <vector>
 
 namespace prolate {
 
 class Winding {
 public:
+    /// What a node of the tree looks like from afar: the first terms of a Taylor expansion around `center`, in
+    /// N = area * unit normal. They are moments of the surface too, from which its integrals follow.
+    struct Moments {
+        Vec center;    // of area
+        Vec dipole;    // sum of N
+        Mat moment;    // sum of N * transpose(centroid - center)
+        double radius; // of the ball around `center`
+    };
+
     explicit Winding(MeshView mesh);
 
     /// Winding number at `p`. A cluster of radius r counts as far at a distance above `accuracy` * r. Thread-safe.
     double operator()(const Vec& p, double accuracy = 3) const;
 
-private:
-    struct Node {
-        Vec center, dipole; // dipole: sum of area * unit normal
-        Mat moment;         // sum of area * unit normal * transpose(centroid - center)
-        double radius;
-        uint32_t begin, end; // triangles, in order_
-        uint32_t right;      // second child; the first follows the node; 0 for a leaf
-    };
-    void build(uint32_t begin, uint32_t end);
+    /// Winding number of a closed mesh, where it is whole; nothing if `p` is on the surface, for all that can be told
+    /// quickly. Thread-safe.
+    std::optional<double> whole(const Vec& p) const;
 
-    std::vector<std::array<Vec, 3>> corners_;
-    std::vector<Node> nodes_;
+    const TriangleTree& tree() const { return tree_; }
+    /// Of tree().nodes(), in the same order.
+    std::span<const Moments> moments() const { return moments_; }
+
+private:
+    TriangleTree tree_;
+    std::vector<Moments> moments_;
 };
 
 /// Signed solid angle of the triangle a, b, c seen from p, in (-2 pi, 2 pi] (Van Oosterom and Strackee 1983).
