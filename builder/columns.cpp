@@ -10,6 +10,9 @@
 namespace prolate {
 namespace {
 
+// The frame of measuring lattices: its x-axis runs along (golden ratio, 1), a slope far from every simple fraction.
+constexpr ColumnLattice kTurned{0, 0, 1, 1, 0, 0, 0.85065080835203993, 0.52573111211913361};
+
 struct Crossing {
     double z;
     int sign; // +1: going up enters (normal points down)
@@ -34,8 +37,9 @@ std::pair<int, int> index_range(double low, double high, double x0, double pitch
 }
 
 template <class Visit> void for_each_crossing(MeshView mesh, const ColumnLattice& lattice, Visit&& visit) {
+    const auto corner = [&](uint32_t v) { return lattice.to_frame(to_vec(mesh.vertices[v])); };
     for (const Triangle& t : mesh.triangles) {
-        const Vec a = to_vec(mesh.vertices[t[0]]), b = to_vec(mesh.vertices[t[1]]), c = to_vec(mesh.vertices[t[2]]);
+        const Vec a = corner(t[0]), b = corner(t[1]), c = corner(t[2]);
         const auto [i0, i1] = index_range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), lattice.x0,
                                           lattice.dx, lattice.nx);
         const auto [j0, j1] = index_range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), lattice.y0,
@@ -60,6 +64,46 @@ template <class Visit> void for_each_crossing(MeshView mesh, const ColumnLattice
     }
 }
 
+// A sum over columns, for each of the four interleaved lattices by itself.
+class Sum {
+public:
+    void add(int i, int j, double length) {
+        part_[static_cast<size_t>(2 * (i & 1) + (j & 1))] += length;
+        longest_ = std::max(longest_, length);
+    }
+    void add(const Sum& other) {
+        for (size_t k = 0; k < 4; ++k) part_[k] += other.part_[k];
+        longest_ = std::max(longest_, other.longest_);
+    }
+    Quadrature times(double area) const {
+        const double value = area * (part_[0] + part_[1] + part_[2] + part_[3]);
+        double furthest = 0;
+        for (const double part : part_) furthest = std::max(furthest, std::abs(4 * area * part - value));
+        return {value, furthest + 2 * area * longest_};
+    }
+
+private:
+    double part_[4] = {}, longest_ = 0;
+};
+
+// A lattice of square cells over the box, which is in the turned frame.
+ColumnLattice measuring_lattice(const Box& box, int columns_across) {
+    const Vec size = box.size();
+    // A box without width must not ask for columns without number.
+    const double pitch = std::max(std::sqrt(size.x() * size.y()), std::max(size.x(), size.y()) / 64) / columns_across;
+    const auto count = [&](double length) { return static_cast<int>(std::ceil(length / pitch)) + 1; };
+    ColumnLattice lattice = kTurned;
+    // No point of the unbounded lattice beyond these lies in the box. Irrational offsets: on a symmetric model with a
+    // symmetric lattice the four interleaved ones would agree, however wrong they are.
+    constexpr double kOffsetX = 0.41421356237309515, kOffsetY = 0.73205080756887729;
+    lattice.x0 = box.low.x() - kOffsetX * pitch;
+    lattice.y0 = box.low.y() - kOffsetY * pitch;
+    lattice.dx = lattice.dy = pitch;
+    lattice.nx = count(size.x() + kOffsetX * pitch);
+    lattice.ny = count(size.y() + kOffsetY * pitch);
+    return lattice;
+}
+
 } // namespace
 
 Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const ColumnLattice& lattice) : lattice_(lattice) {
@@ -75,6 +119,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
 
     std::vector<std::vector<Interval>> rows(static_cast<size_t>(lattice.nx));
     std::vector<size_t> interval_count(count + 1, 0);
+    std::vector<WindingDefect> defects(static_cast<size_t>(lattice.nx));
     tbb::parallel_for(0, lattice.nx, [&](int i) {
         std::vector<Interval>& row = rows[static_cast<size_t>(i)];
         for (int j = 0; j < lattice.ny; ++j) {
@@ -92,12 +137,14 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
                 depth += own[k].sign;
                 const double low = own[k].z, high = own[k + 1].z;
                 if (!(low < high)) continue;
-                bool solid = depth != 0;
+                double number = depth;
                 if (!countable) {
                     const Vec middle(lattice.x0 + i * lattice.dx, lattice.y0 + j * lattice.dy, 0.5 * (low + high));
-                    solid = std::abs(winding(middle)) >= 0.5;
+                    number = winding(lattice.from_frame(middle));
                 }
-                if (!solid) continue;
+                if (std::abs(number) < 0.5) continue;
+                defects[static_cast<size_t>(i)].outward += (high - low) * std::abs(std::round(number) - 1);
+                defects[static_cast<size_t>(i)].inward += (high - low) * std::abs(std::round(number) + 1);
                 if (row.size() > first && row.back().high == low)
                     row.back().high = high;
                 else
@@ -110,91 +157,118 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
     for (size_t c = 0; c < count; ++c) begin_[c + 1] = begin_[c] + interval_count[c + 1];
     intervals_.reserve(begin_[count]);
     for (const std::vector<Interval>& row : rows) intervals_.insert(intervals_.end(), row.begin(), row.end());
+    for (const WindingDefect& row : defects) { // in order: the same sum for any number of threads
+        defect_.outward += row.outward * lattice.dx * lattice.dy;
+        defect_.inward += row.inward * lattice.dx * lattice.dy;
+    }
 }
 
-double Columns::volume() const {
-    double length = 0;
-    for (const Interval& s : intervals_) length += s.high - s.low;
-    return length * lattice_.dx * lattice_.dy;
+Quadrature Columns::volume() const {
+    Sum sum;
+    for (int i = 0; i < lattice_.nx; ++i)
+        for (int j = 0; j < lattice_.ny; ++j)
+            for (const Interval& s : column(i, j)) sum.add(i, j, s.high - s.low);
+    return sum.times(lattice_.dx * lattice_.dy);
 }
 
-CoverVolume measure_cover(MeshView mesh, bool closed, const Winding& winding, std::span<const Ellipsoid> ellipsoids,
-                          int columns_across) {
-    // Each ellipsoid as Q^-1 = L^-T L^-1 and its half extents in x and y.
+Columns measuring_columns(MeshView mesh, bool closed, const Winding& winding, int columns_across) {
+    Box box;
+    for (const Vec3& v : mesh.vertices) box.add(kTurned.to_frame(to_vec(v)));
+    return {mesh, closed, winding, measuring_lattice(box, columns_across)};
+}
+
+CoverVolume measure_cover(const Columns& solid, std::span<const Ellipsoid> ellipsoids) {
+    const ColumnLattice& lattice = solid.lattice();
+    // Each ellipsoid in the lattice's frame, as L^-1, with the rows and columns that it meets: first ... last.
     struct Shape {
         Vec c;
-        Mat inverse; // L^-1
-        double ex, ey;
+        Mat inverse;
+        int i0, i1, j0, j1;
     };
     std::vector<Shape> shapes;
-    Box box;
+    int row_low = 0, row_high = lattice.nx - 1;
     for (const Ellipsoid& e : ellipsoids) {
         Mat l;
         l << e.l11, 0, 0, e.l21, e.l22, 0, e.l31, e.l32, e.l33;
-        const Vec half = l.rowwise().norm();
-        const Vec c = to_vec(e.center);
         const Mat inverse = l.triangularView<Eigen::Lower>().solve(Mat::Identity());
-        shapes.push_back({c, inverse, half.x(), half.y()});
-        box.add(c - half);
-        box.add(c + half);
+        Mat turned, turned_inverse; // the columns of L, the rows of L^-1
+        for (int k = 0; k < 3; ++k) {
+            turned.col(k) = lattice.to_frame(l.col(k));
+            turned_inverse.row(k) = lattice.to_frame(inverse.row(k)).transpose();
+        }
+        const Vec half = turned.rowwise().norm(), c = lattice.to_frame(to_vec(e.center));
+        const auto index = [](double x, double origin, double step) {
+            return static_cast<int>(std::clamp(std::floor((x - origin) / step), -1e6, 1e6));
+        };
+        shapes.push_back({c, turned_inverse, index(c.x() - half.x(), lattice.x0, lattice.dx) + 1,
+                          index(c.x() + half.x(), lattice.x0, lattice.dx),
+                          index(c.y() - half.y(), lattice.y0, lattice.dy) + 1,
+                          index(c.y() + half.y(), lattice.y0, lattice.dy)});
+        row_low = std::min(row_low, shapes.back().i0), row_high = std::max(row_high, shapes.back().i1);
     }
-    for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
-    const double dx = box.size().x() / columns_across, dy = box.size().y() / columns_across;
-    // An irrational offset: no column of a mesh modelled on round numbers falls on its edges.
-    const ColumnLattice lattice{
-        box.low.x() + 0.41421356 * dx, box.low.y() + 0.73205081 * dy, dx, dy, columns_across, columns_across};
-    const Columns solid(mesh, closed, winding, lattice);
+    std::vector<std::vector<uint32_t>> by_row(static_cast<size_t>(row_high - row_low + 1));
+    for (uint32_t s = 0; s < shapes.size(); ++s)
+        for (int i = shapes[s].i0; i <= shapes[s].i1; ++i) by_row[static_cast<size_t>(i - row_low)].push_back(s);
 
-    std::vector<std::vector<uint32_t>> by_row(static_cast<size_t>(lattice.nx));
-    for (uint32_t s = 0; s < shapes.size(); ++s) {
-        const auto [i0, i1] =
-            index_range(shapes[s].c.x() - shapes[s].ex, shapes[s].c.x() + shapes[s].ex, lattice.x0, dx, lattice.nx);
-        for (int i = i0; i <= i1; ++i) by_row[static_cast<size_t>(i)].push_back(s);
-    }
-    std::vector<CoverVolume> rows(static_cast<size_t>(lattice.nx));
-    tbb::parallel_for(0, lattice.nx, [&](int i) {
-        const double x = lattice.x0 + i * dx;
-        std::vector<std::vector<Interval>> cover(static_cast<size_t>(lattice.ny));
-        for (const uint32_t s : by_row[static_cast<size_t>(i)]) {
+    struct Row {
+        Sum solid, whole, outside, sum_outside;
+    };
+    std::vector<Row> rows(by_row.size());
+    tbb::parallel_for(size_t{0}, rows.size(), [&](size_t r) {
+        Row& sum = rows[r];
+        const int i = static_cast<int>(r) + row_low;
+        const auto solid_in = [&](int j) {
+            const bool on_lattice = i >= 0 && i < lattice.nx && j >= 0 && j < lattice.ny;
+            return on_lattice ? solid.column(i, j) : std::span<const Interval>();
+        };
+        // What of an interval is outside the solid.
+        const auto outside = [&](int j, const Interval& s) {
+            double length = s.high - s.low;
+            for (const Interval& t : solid_in(j))
+                length -= std::max(0.0, std::min(s.high, t.high) - std::max(s.low, t.low));
+            return length;
+        };
+        struct Piece {
+            int j;
+            Interval z;
+        };
+        std::vector<Piece> cover;
+        const double x = lattice.x0 + i * lattice.dx;
+        for (const uint32_t s : by_row[r]) {
             const Shape& shape = shapes[s];
-            const auto [j0, j1] =
-                index_range(shape.c.y() - shape.ey, shape.c.y() + shape.ey, lattice.y0, dy, lattice.ny);
-            for (int j = j0; j <= j1; ++j) {
-                // |w + z u|^2 = 1 with u = the z-column of L^-1, w = the rest.
-                const Vec w = shape.inverse.col(0) * (x - shape.c.x()) +
-                              shape.inverse.col(1) * (lattice.y0 + j * dy - shape.c.y());
-                const Vec u = shape.inverse.col(2);
-                const double uu = u.squaredNorm(), uw = u.dot(w), discriminant = uw * uw - uu * (w.squaredNorm() - 1);
+            // |w + z u|^2 = 1 with u = the z-column of L^-1, w = the rest.
+            const Vec u = shape.inverse.col(2), wx = shape.inverse.col(0) * (x - shape.c.x());
+            const double uu = u.squaredNorm();
+            for (int j = shape.j0; j <= shape.j1; ++j) {
+                const Vec w = wx + shape.inverse.col(1) * (lattice.y0 + j * lattice.dy - shape.c.y());
+                const double uw = u.dot(w), discriminant = uw * uw - uu * (w.squaredNorm() - 1);
                 if (discriminant <= 0) continue;
-                const double root = std::sqrt(discriminant);
-                cover[static_cast<size_t>(j)].push_back(
-                    {shape.c.z() + (-uw - root) / uu, shape.c.z() + (-uw + root) / uu});
+                const double middle = shape.c.z() - uw / uu, half = std::sqrt(discriminant) / uu;
+                cover.push_back({j, {middle - half, middle + half}});
+                sum.sum_outside.add(i, j, outside(j, cover.back().z));
             }
         }
-        CoverVolume& sum = rows[static_cast<size_t>(i)];
-        for (int j = 0; j < lattice.ny; ++j) {
-            const std::span<const Interval> inside = solid.column(i, j);
-            for (const Interval& s : inside) sum.solid += s.high - s.low;
-            std::vector<Interval>& own = cover[static_cast<size_t>(j)];
-            std::sort(own.begin(), own.end(), [](const Interval& s, const Interval& t) { return s.low < t.low; });
-            for (size_t k = 0; k < own.size();) { // maximal intervals of the union, each less the solid
-                const double low = own[k].low;
-                double high = own[k].high;
-                for (++k; k < own.size() && own[k].low <= high; ++k) high = std::max(high, own[k].high);
-                sum.whole += high - low;
-                sum.outside += high - low;
-                for (const Interval& s : inside)
-                    sum.outside -= std::max(0.0, std::min(high, s.high) - std::max(low, s.low));
-            }
+        for (int j = 0; j < lattice.ny; ++j)
+            for (const Interval& s : solid_in(j)) sum.solid.add(i, j, s.high - s.low);
+        std::sort(cover.begin(), cover.end(),
+                  [](const Piece& a, const Piece& b) { return a.j != b.j ? a.j < b.j : a.z.low < b.z.low; });
+        for (size_t k = 0; k < cover.size();) { // maximal intervals of the union
+            auto [j, piece] = cover[k];
+            for (++k; k < cover.size() && cover[k].j == j && cover[k].z.low <= piece.high; ++k)
+                piece.high = std::max(piece.high, cover[k].z.high);
+            sum.whole.add(i, j, piece.high - piece.low);
+            sum.outside.add(i, j, outside(j, piece));
         }
     });
-    CoverVolume total;
-    for (const CoverVolume& row : rows) { // in order: the same sum for any number of threads
-        total.solid += row.solid * dx * dy;
-        total.whole += row.whole * dx * dy;
-        total.outside += row.outside * dx * dy;
+    Row total;
+    for (const Row& row : rows) { // in order: the same sum for any number of threads
+        total.solid.add(row.solid);
+        total.whole.add(row.whole);
+        total.outside.add(row.outside);
+        total.sum_outside.add(row.sum_outside);
     }
-    return total;
+    const double area = lattice.dx * lattice.dy;
+    return {total.solid.times(area), total.whole.times(area), total.outside.times(area), total.sum_outside.times(area)};
 }
 
 } // namespace prolate

@@ -19,10 +19,32 @@ struct Interval {
     double low, high;
 };
 
-/// Columns at (x0 + i * dx, y0 + j * dy), 0 <= i < nx, 0 <= j < ny.
+/// Columns at (x0 + i * dx, y0 + j * dy), 0 <= i < nx, 0 <= j < ny, in a frame turned about z.
 struct ColumnLattice {
     double x0, y0, dx, dy;
     int nx, ny;
+    double cosine = 1, sine = 0; ///< of the angle that the frame is turned by
+
+    Vec to_frame(const Vec& p) const { return {cosine * p.x() + sine * p.y(), cosine * p.y() - sine * p.x(), p.z()}; }
+    Vec from_frame(const Vec& p) const { return {cosine * p.x() - sine * p.y(), cosine * p.y() + sine * p.x(), p.z()}; }
+};
+
+/// A volume by quadrature over the columns of a lattice.
+struct Quadrature {
+    double value = 0;
+    /// How far the value moves, at most, if only one of the four interleaved lattices of twice the pitch is used, plus
+    /// two of the longest columns (where walls are straight, the four may agree on one column too many). No strict
+    /// bound, but on the large side, because the whole lattice converges faster than its quarters: with 128 to 512
+    /// columns across it was below the true error for 1 of 1200 boxes and tori of random size and attitude, and 20 to
+    /// 40 times as large in the median.
+    double error = 0;
+};
+
+/// How far a mesh is from winding around its solid just once: the integral of |w - 1| over the solid, w the winding
+/// number, and that of |w + 1|. The one is 0 for a mesh whose normals point outwards and which does not overlap itself,
+/// the other for such a mesh turned inside out. Then surface integrals give the solid's volumes, or their negatives.
+struct WindingDefect {
+    double outward = 0, inward = 0;
 };
 
 class Columns {
@@ -38,24 +60,31 @@ public:
     }
     const ColumnLattice& lattice() const { return lattice_; }
     /// Volume of the solid by these columns.
-    double volume() const;
+    Quadrature volume() const;
+    /// By these columns: what is thinner than their distance may go unseen.
+    const WindingDefect& winding_defect() const { return defect_; }
 
 private:
     ColumnLattice lattice_;
     std::vector<size_t> begin_;
     std::vector<Interval> intervals_;
+    WindingDefect defect_;
 };
+
+/// About columns_across^2 columns over the mesh, to measure with: a lattice of their own, so that figures are not read
+/// off the grid that was optimised. It is turned by an angle that the walls of no ordinary model have: a wall along a
+/// lattice would fall between two rows of it, and all of it to one side.
+Columns measuring_columns(MeshView mesh, bool closed, const Winding& winding, int columns_across);
 
 /// Volumes of a union of ellipsoids against the solid.
 struct CoverVolume {
-    double solid = 0;   ///< of the solid
-    double whole = 0;   ///< of the union
-    double outside = 0; ///< of the union less the solid
+    Quadrature solid;       ///< of the solid
+    Quadrature whole;       ///< of the union
+    Quadrature outside;     ///< of the union less the solid
+    Quadrature sum_outside; ///< sum over the ellipsoids, each less the solid
 };
 
-/// Measures the union of `ellipsoids` against the solid on columns_across x columns_across columns over all of it: a
-/// lattice of its own, so that figures are not read off the grid that was optimised.
-CoverVolume measure_cover(MeshView mesh, bool closed, const Winding& winding, std::span<const Ellipsoid> ellipsoids,
-                          int columns_across);
+/// Measures the union of `ellipsoids` against the solid, on its columns; beyond them the same lattice goes on.
+CoverVolume measure_cover(const Columns& solid, std::span<const Ellipsoid> ellipsoids);
 
 } // namespace prolate

@@ -1,11 +1,12 @@
 #include "builder/cover.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace prolate {
 
-std::optional<format::PackedNode> covering_node(const Fit& fit, const Voxels& voxels, std::span<const uint32_t> cells,
-                                                const format::Lattice& lattice) {
+std::optional<format::PackedNode> covering_node(const Fit& fit, const format::Lattice& lattice,
+                                                const std::function<double(const Fit&)>& reach_of) {
     constexpr int kRounds = 64;
     double scale = 1;
     for (int round = 0; round < kRounds; ++round) {
@@ -14,13 +15,32 @@ std::optional<format::PackedNode> covering_node(const Fit& fit, const Voxels& vo
         format::PackedNode node;
         format::quantise(node, lattice, fit.center.data(), factor);
         const Fit decoded(format::decode(node, lattice));
-        double reach = 0;
-        for (const uint32_t cell : cells) reach = std::max(reach, decoded.reach(voxels.points(cell)));
+        const double reach = reach_of(decoded);
         if (reach <= 1 - kSlack) return node;
         // Rounding may undo a tiny enlargement: enlarge a little more each round.
         scale *= reach / (1 - kSlack) * (1 + 1e-6 * (1 << std::min(round, 12)));
     }
     return std::nullopt;
+}
+
+std::optional<format::PackedNode> covering_node(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members,
+                                                const format::Lattice& lattice) {
+    return covering_node(fit, lattice, [&](const Fit& decoded) {
+        double reach = 0;
+        for (const uint32_t piece : members) reach = std::max(reach, decoded.reach(pieces.points(piece)));
+        return reach;
+    });
+}
+
+double surface_error(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members) {
+    double largest = 0;
+    for (const uint32_t piece : members)
+        pieces.for_each_surface_point(piece, [&](const Vec& p) {
+            const double radial = std::sqrt(fit.radial_squared(p));
+            // At the very center every direction is radial; the shortest way out is the smallest semi-axis.
+            if (radial > 1e-12) largest = std::max(largest, std::abs(1 - 1 / radial) * (p - fit.center).norm());
+        });
+    return largest;
 }
 
 } // namespace prolate

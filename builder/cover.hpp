@@ -2,22 +2,32 @@
 #pragma once
 
 #include "builder/fit.hpp"
-#include "builder/voxels.hpp"
+#include "builder/pieces.hpp"
 
 #include "src/format.hpp"
 
+#include <functional>
 #include <optional>
 #include <span>
 
 namespace prolate {
 
-/// Points of the cells reach at most to 1 - kSlack in radial coordinates. The slack (0.02 % of the volume) absorbs the
+/// Points of the pieces reach at most to 1 - kSlack in radial coordinates. The slack (0.02 % of the volume) absorbs the
 /// rounding of the clipped points by a wide margin and lets verify() end quickly.
 inline constexpr double kSlack = 0x1p-14;
 
-/// Quantises `fit` and enlarges it by the least that makes the decoded ellipsoid cover the points of `cells`. Cover
-/// does therefore not depend on how well the fit converged. Empty only if the format cannot hold the size.
-std::optional<format::PackedNode> covering_node(const Fit& fit, const Voxels& voxels, std::span<const uint32_t> cells,
+/// Quantises `fit` and enlarges it by the least that brings `reach` of the decoded ellipsoid, the largest radial
+/// coordinate of what it has to hold, below 1. Cover does therefore not depend on how well the fit converged. Empty
+/// only if the format cannot hold the size.
+std::optional<format::PackedNode> covering_node(const Fit& fit, const format::Lattice& lattice,
+                                                const std::function<double(const Fit&)>& reach);
+
+/// The same for the points of `members`.
+std::optional<format::PackedNode> covering_node(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members,
                                                 const format::Lattice& lattice);
+
+/// E_sur: largest radial distance |p - d_o(p)| between a point of the mesh in `members` and its radial projection onto
+/// the ellipsoid (paper, eq. 1), over the corners of the clipped triangles.
+double surface_error(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members);
 
 } // namespace prolate
