@@ -3,7 +3,9 @@
 #include <prolate/verify.hpp>
 
 #include "builder/cover.hpp"
+#include "builder/exact.hpp"
 #include "builder/grow.hpp"
+#include "builder/hausdorff.hpp"
 
 #include "src/format.hpp"
 
@@ -13,7 +15,6 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <new>
 
@@ -26,31 +27,23 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-struct Effort {
-    uint32_t resolution;        // cells along the longest side, at least
-    int sweeps, trials, starts; // see SplitOptions
-};
-
-Effort effort_of(Quality quality) {
-    switch (quality) {
-    case Quality::fast:
-        return {64, 4, 12, 1};
-    case Quality::normal:
-        return {96, 10, 32, 4};
-    case Quality::best:
-        return {128, 20, 80, 8};
-    }
-    return {96, 10, 32, 4};
-}
-
 constexpr uint32_t kMaxResolution = 320;
-constexpr double kCellsPerLeaf = 40;     // fewer, and leaves follow the grid instead of the shape
-constexpr uint32_t kSamplesPerCell = 2;  // surface samples, on average over all cells
-constexpr int kMeasureColumns = 512;     // of the reported figures
-constexpr double kSmallestRadius = 1e-5; // of the diagonal
+constexpr uint32_t kMaxFieldResolution = 256;
+constexpr double kFieldResolution = 1.25; // of the distance field, against the voxels'
+constexpr double kPiecesPerLeaf = 40;     // fewer, and leaves follow the grid instead of the shape
+constexpr double kCellsPerLeaf = 24;      // of the coarser grid that the optimisation starts from
+constexpr uint32_t kLeastCells = 48;      // of that grid, along the longest side
+constexpr int kMeterColumns = 192;        // to compare covers while baking
+constexpr int kMeasureColumns = 512;      // of the reported figures
+constexpr double kSmallestRadius = 1e-5;  // of the diagonal
+// How exactly distances are measured, by quality.
+constexpr double kDistanceTolerance[] = {1e-3, 1e-4, 1e-4};  // of the largest one, in diagonals
+constexpr uint32_t kDistanceSamples[] = {2000, 8000, 32000}; // for mean and percentile
 
 // A solid of less than this share of its diagonal's cube has no inside worth the name.
 constexpr double kNoInside = 1e-12;
+// Volume that may lie in several overlapping parts of a mesh, for the analytic method: share of the solid.
+constexpr double kMostOverlap = 1e-3;
 
 // One build, start to end. Members are in the order in which they come to life.
 class Bake {
@@ -64,42 +57,82 @@ public:
         if (!cleaned) return cleaned.error();
         mesh_ = cleaned->mesh.view();
         closed_ = cleaned->report.closed;
+        for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
+        if (options_.exact) return run_exact(cleaned->report, start);
         if (!report("voxelise", 0, 0)) return stopped();
 
         const Winding winding(mesh_);
-        const Voxels voxels = voxelise(winding);
-        measure_solid(winding);
-        if (options_.tolerance > 0 && solid_volume_ == 0)
+        Pieces pieces = cut_pieces(winding);
+        if (!report("voxelise", 0.04, 0)) return stopped();
+        const Columns columns = measure_solid(winding);
+        if (options_.tolerance > 0 && solid_.value == 0)
             return Error{ErrorCode::bad_mesh,
                          "the mesh encloses no volume, so no outside ratio can be met; "
                          "give levels or a count instead of a tolerance",
                          0};
-        if (!report("split", 0.05, 1)) return stopped();
+        if (options_.method == Method::analytic) {
+            const WindingDefect& defect = columns.winding_defect();
+            winding_sign_ = defect.inward < defect.outward ? -1 : 1;
+            if (!closed_ || std::min(defect.inward, defect.outward) > kMostOverlap * solid_.value)
+                return Error{ErrorCode::bad_mesh,
+                             "the analytic method needs a closed mesh whose parts do not overlap; use the voxel method",
+                             0};
+        }
+        if (!report("fit", 0.05, 1)) return stopped();
 
-        const Grown grown = grow_tree(voxels, winding);
+        const Grown grown = grow_tree(pieces, winding);
         if (cancelled_) return stopped();
 
         std::vector<format::PackedLevel> levels;
-        if (auto packed = pack(grown, voxels, levels); !packed) return packed.error();
-        if (!report("measure", 0.8, static_cast<uint32_t>(grown.nodes.size()))) return stopped();
-        const BakeInfo info = describe();
+        if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
+        const BakeInfo info = describe(grown.goal_reached);
         // Measured on decoded nodes, so that the figures are the file's; they are then written into its levels table.
         std::vector<LevelReport> figures;
         {
             auto draft = Tree::open(format::encode(info, options_.degree, lattice_, levels));
             if (!draft) return draft.error();
-            figures = measure(draft->view(), grown, winding, levels);
+            figures = measure(draft->view(), grown, columns, winding, levels);
+            if (cancelled_) return stopped();
         }
         auto tree = Tree::open(format::encode(info, options_.degree, lattice_, levels));
         if (!tree) return tree.error();
 
         if (auto proved = prove(tree->view(), figures); !proved) return proved.error();
-        Build build{std::move(*tree), cleaned->report, std::move(figures), solid_volume_,       box_.size().norm(),
-                    resolution_,      !closed_,        grown.goal_reached, seconds_since(start)};
-        return build;
+        return Build{std::move(*tree),   cleaned->report, std::move(figures), solid_.value,       solid_.error,
+                     box_.size().norm(), resolution_,     !closed_,           grown.goal_reached, seconds_since(start)};
     }
 
 private:
+    Result<Build> run_exact(const MeshReport& mesh_report, Clock::time_point start) {
+        if (!report("measure", 0, 0)) return stopped();
+        measure_solid(Winding(mesh_));
+        if (!report("split", 0.1, 1)) return stopped();
+        ExactOptions options{options_.degree, options_.leaf_triangles, kSmallestRadius * box_.size().norm(), {}};
+        if (progress_) options.progress = [this](double done) { return report("split", 0.1 + 0.75 * done, 0); };
+        const auto grown = grow_exact(mesh_, options);
+        if (!grown) return grown.error();
+        auto tree =
+            Tree::open(format::encode(describe(true), options_.degree, grown->lattice, grown->levels, grown->packed()));
+        if (!tree) return tree.error();
+
+        std::vector<LevelReport> figures(tree->view().level_count()); // of a cover of the surface alone: none
+        for (uint32_t l = 0; l < figures.size(); ++l) {
+            figures[l].bytes = tree->view().level(l).end_byte;
+            tree->view().for_each_in_cut(l, [&](uint32_t) { ++figures[l].nodes; });
+        }
+        if (auto proved = prove(tree->view(), figures); !proved) return proved.error();
+        return Build{std::move(*tree),   mesh_report, std::move(figures), solid_.value, solid_.error,
+                     box_.size().norm(), 0,           !closed_,           true,         seconds_since(start)};
+    }
+
+    // Sets the solid's volume, unless it is too small to be one.
+    Columns measure_solid(const Winding& winding) {
+        Columns columns = measuring_columns(mesh_, closed_, winding, kMeasureColumns);
+        const Quadrature solid = columns.volume();
+        if (solid.value > kNoInside * std::pow(box_.size().norm(), 3)) solid_ = solid;
+        return columns;
+    }
+
     bool report(const char* stage, double fraction, uint32_t nodes) {
         if (!progress_) return true;
         const std::lock_guard lock(reporting_);
@@ -109,6 +142,9 @@ private:
     }
     static Error stopped() { return {ErrorCode::cancelled, "cancelled", 0}; }
 
+    // A volume as a share of the solid's.
+    double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
+
     // Leaves to expect, for the choice of the resolution.
     double expected_leaves() const {
         if (options_.ellipsoids) return options_.ellipsoids;
@@ -116,74 +152,68 @@ private:
         return std::min(std::pow(double(options_.degree), options_.levels ? options_.levels : 3u), 65536.0);
     }
 
-    void measure_solid(const Winding& winding) {
-        const Vec step = box_.size() / kMeasureColumns;
-        const Columns columns(mesh_, closed_, winding,
-                              {box_.low.x() + 0.41421356 * step.x(), box_.low.y() + 0.73205081 * step.y(), step.x(),
-                               step.y(), kMeasureColumns, kMeasureColumns});
-        const double volume = columns.volume();
-        solid_volume_ = volume > kNoInside * std::pow(box_.size().norm(), 3) ? volume : 0;
-    }
-
-    Voxels voxelise(const Winding& winding) {
-        for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
+    // Fine enough for the leaves to come.
+    Pieces cut_pieces(const Winding& winding) {
         resolution_ = effort_.resolution;
         for (;;) {
-            Voxels voxels(mesh_, closed_, winding, resolution_);
-            const double wanted = kCellsPerLeaf * expected_leaves();
-            const double cells = voxels.cell_count();
-            if (cells >= wanted || resolution_ == kMaxResolution) {
-                const auto samples = static_cast<uint32_t>(std::min(cells * kSamplesPerCell, 4e6));
-                voxels.sample_surface(mesh_, samples, options_.seed);
-                return voxels;
-            }
-            // Cells grow with the square (surface) to the cube (volume) of the resolution.
-            const double grow = std::clamp(std::sqrt(wanted / cells), 1.05, 2.0);
-            resolution_ = std::min(kMaxResolution, static_cast<uint32_t>(std::ceil(resolution_ * grow)));
+            const bool go_on = report("voxelise", 0.01, 0);
+            Pieces pieces(mesh_, closed_, winding, resolution_);
+            if (pieces.size() >= kPiecesPerLeaf * expected_leaves() || resolution_ == kMaxResolution || !go_on)
+                return pieces;
+            resolution_ = finer(resolution_, kPiecesPerLeaf * expected_leaves() / pieces.size());
         }
     }
+    Voxels start_cells(const Winding& winding) const {
+        for (uint32_t resolution = std::min(kLeastCells, resolution_);;) {
+            Voxels cells(mesh_, closed_, winding, resolution);
+            if (cells.cell_count() >= kCellsPerLeaf * expected_leaves() || resolution == resolution_) return cells;
+            resolution =
+                std::min(resolution_, finer(resolution, kCellsPerLeaf * expected_leaves() / cells.cell_count()));
+        }
+    }
+    // A resolution that gives about `times` as many cells: they grow with its square (surface) to its cube (volume).
+    static uint32_t finer(uint32_t resolution, double times) {
+        const double grown = std::ceil(resolution * std::clamp(std::sqrt(times), 1.05, 2.0));
+        return std::min(kMaxResolution, static_cast<uint32_t>(grown));
+    }
 
-    Grown grow_tree(const Voxels& voxels, const Winding& winding) {
-        GrowOptions options;
-        options.build = options_;
-        options.split = {{options_.alpha, options_.beta},
-                         kSmallestRadius * box_.size().norm(),
-                         effort_.sweeps,
-                         effort_.trials,
-                         effort_.starts,
-                         options_.seed,
-                         &cancelled_};
-        options.outside_ratio = [&](const std::vector<Fit>& fits) {
-            std::vector<Ellipsoid> ellipsoids;
-            for (const Fit& fit : fits) {
-                const auto l = fit.factor.cast<float>();
-                const Eigen::Vector3f c = fit.center.cast<float>();
-                ellipsoids.push_back({{c.x(), c.y(), c.z()}, l(0, 0), l(1, 0), l(1, 1), l(2, 0), l(2, 1), l(2, 2)});
-            }
-            return measure_cover(mesh_, closed_, winding, ellipsoids, kMeasureColumns / 2).outside / solid_volume_;
+    Grown grow_tree(Pieces& pieces, const Winding& winding) {
+        const auto field_resolution = static_cast<uint32_t>(kFieldResolution * resolution_);
+        const DistanceField field(mesh_, closed_, winding, std::min(field_resolution, kMaxFieldResolution));
+        const Voxels cells = start_cells(winding);
+        const Columns columns = measuring_columns(mesh_, closed_, winding, kMeterColumns);
+        const GrowOptions options{options_, effort_, kSmallestRadius * box_.size().norm(), &cancelled_,
+                                  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
+        const auto exact = [&winding, sign = winding_sign_](const Fit& fit) {
+            EllipsoidVolume inside = inside_volume(fit, winding);
+            inside.volume *= sign, inside.d_center *= sign, inside.d_shape *= sign;
+            return outside_volume(fit, inside);
         };
-        options.progress = [&](double done, uint32_t nodes) { return report("split", 0.05 + 0.75 * done, nodes); };
-        return grow(voxels, options);
+        Solid solid{pieces, cells, field, columns, {}};
+        if (options_.method == Method::analytic) solid.outside = exact;
+        return grow(solid, options);
     }
 
     // Quantised nodes, breadth-first, each enlarged until its decoded ellipsoid covers.
-    Result<void> pack(const Grown& grown, const Voxels& voxels, std::vector<format::PackedLevel>& levels) {
+    Result<void> pack(const Grown& grown, const Pieces& pieces, std::vector<format::PackedLevel>& levels) {
         Box centers;
-        for (const GrownNode& node : grown.nodes) centers.add(node.cluster.fit.center);
+        for (const GrownNode& node : grown.nodes) centers.add(node.fit.center);
         lattice_ = format::lattice_for(centers.low.data(), centers.high.data());
+        surface_errors_.resize(grown.nodes.size());
         std::vector<uint32_t> current{0};
         while (!current.empty()) {
             std::vector<uint32_t> next;
             format::PackedLevel& level = levels.emplace_back();
             for (const uint32_t index : current) {
                 const GrownNode& node = grown.nodes[index];
-                auto packed = covering_node(node.cluster.fit, voxels, node.cluster.cells, lattice_);
+                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_);
                 if (!packed)
                     return Error{ErrorCode::bad_mesh,
                                  "the mesh is too large or too small for the file format; "
                                  "scale it to metres",
                                  index};
                 packed->child_count = static_cast<uint8_t>(node.child_count);
+                surface_errors_[index] = surface_error(Fit(format::decode(*packed, lattice_)), pieces, node.pieces);
                 level.nodes.push_back(*packed);
                 for (uint32_t c = 0; c < node.child_count; ++c) next.push_back(node.first_child + c);
             }
@@ -192,49 +222,62 @@ private:
         return {};
     }
 
-    BakeInfo describe() const {
+    BakeInfo describe(bool goal_reached) const {
         BakeInfo info;
         info.source_hash = hash(mesh_);
         info.options_hash = hash(options_);
         info.surface_mode = !closed_;
-        info.solid_volume = solid_volume_;
+        info.exact = options_.exact;
+        info.proved = true; // or there will be no file, see prove()
+        info.goal_reached = goal_reached;
+        info.solid_volume = solid_.value;
+        info.solid_volume_error = static_cast<float>(relative(solid_.error));
+        info.diagonal = box_.size().norm();
         info.method = options_.method;
         info.primitive = options_.primitive;
         info.quality = options_.quality;
         info.alpha = options_.alpha;
         info.beta = options_.beta;
         info.tolerance = options_.tolerance;
-        info.levels = options_.levels || options_.ellipsoids || options_.tolerance > 0 ? options_.levels : 3;
+        const bool asked = options_.levels || options_.ellipsoids || options_.tolerance > 0 || options_.exact;
+        info.levels = asked ? options_.levels : 3;
         info.ellipsoids = options_.ellipsoids;
         info.seed = options_.seed;
         info.resolution = resolution_;
         return info;
     }
 
-    std::vector<LevelReport> measure(const TreeView& tree, const Grown& grown, const Winding& winding,
-                                     std::vector<format::PackedLevel>& levels) {
-        constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+    std::vector<LevelReport> measure(const TreeView& tree, const Grown& grown, const Columns& columns,
+                                     const Winding& winding, std::vector<format::PackedLevel>& levels) {
         std::vector<LevelReport> figures;
         for (uint32_t l = 0; l < tree.level_count(); ++l) {
+            if (!report("measure", 0.8 + 0.05 * l / tree.level_count(), tree.node_count())) return {};
             const auto start = Clock::now();
             std::vector<Ellipsoid> cut;
             tree.for_each_in_cut(l, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
-            const CoverVolume volume = measure_cover(mesh_, closed_, winding, cut, kMeasureColumns);
+            const CoverVolume volume = measure_cover(columns, cut);
             LevelReport figure;
-            double outside = 0;
-            for (const GrownNode& node : grown.nodes)
-                if (node.level == l || (node.level < l && node.child_count == 0)) {
-                    outside += node.outside;
-                    figure.surface_error = std::max(figure.surface_error, node.surface_error);
-                }
+            figure.surface_error = 0;
+            for (size_t n = 0; n < grown.nodes.size(); ++n)
+                if (grown.nodes[n].level == l || (grown.nodes[n].level < l && grown.nodes[n].child_count == 0))
+                    figure.surface_error = std::max(figure.surface_error, surface_errors_[n]);
             figure.nodes = static_cast<uint32_t>(cut.size());
             figure.bytes = tree.level(l).end_byte;
-            figure.union_volume = volume.whole;
-            figure.outside_ratio = solid_volume_ > 0 ? volume.outside / solid_volume_ : kUnknown;
-            figure.sum_outside_ratio = solid_volume_ > 0 ? outside / solid_volume_ : kUnknown;
+            figure.union_volume = volume.whole.value;
+            if (solid_.value > 0) {
+                figure.outside_ratio = relative(volume.outside.value);
+                figure.outside_ratio_error =
+                    relative(volume.outside.error) + figure.outside_ratio * relative(solid_.error);
+                figure.sum_outside_ratio = relative(volume.sum_outside.value);
+            }
+            const auto quality = static_cast<size_t>(options_.quality);
+            const HausdorffDistance distance = hausdorff_distance(
+                cut, winding, closed_, kDistanceTolerance[quality] * box_.size().norm(), kDistanceSamples[quality]);
+            figure.hausdorff_max = distance.max + distance.max_error;
+            figure.hausdorff_mean = distance.mean;
+            figure.hausdorff_p99 = distance.p99;
             figure.seconds = seconds_since(start) + (l < grown.seconds.size() ? grown.seconds[l] : 0);
-            levels[l].outside_ratio = static_cast<float>(figure.outside_ratio);
-            levels[l].surface_error = static_cast<float>(figure.surface_error);
+            levels[l].figures = figure;
             figures.push_back(figure);
         }
         return figures;
@@ -272,8 +315,10 @@ private:
     bool closed_ = false;
     Box box_;
     uint32_t resolution_ = 0;
-    double solid_volume_ = 0; // 0 where there is no inside
+    Quadrature solid_;        // its volume; 0 where there is no inside
+    double winding_sign_ = 1; // -1: the mesh is inside out
     format::Lattice lattice_;
+    std::vector<double> surface_errors_; // of the grown nodes, as decoded
 };
 
 } // namespace

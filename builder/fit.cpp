@@ -13,18 +13,6 @@
 namespace prolate {
 namespace {
 
-// Lower Cholesky factor in a fixed order of operations.
-Mat cholesky(const Mat& q) {
-    Mat l = Mat::Zero();
-    l(0, 0) = std::sqrt(q(0, 0));
-    l(1, 0) = q(1, 0) / l(0, 0);
-    l(2, 0) = q(2, 0) / l(0, 0);
-    l(1, 1) = std::sqrt(q(1, 1) - l(1, 0) * l(1, 0));
-    l(2, 1) = (q(2, 1) - l(2, 0) * l(1, 0)) / l(1, 1);
-    l(2, 2) = std::sqrt(q(2, 2) - l(2, 0) * l(2, 0) - l(2, 1) * l(2, 1));
-    return l;
-}
-
 Eigen3x3 eigen_of(const Mat& q) {
     Matrix3 a;
     for (size_t i = 0; i < 3; ++i)
@@ -66,6 +54,17 @@ std::vector<Vec> with_thickness(std::span<const Vec> points, double min_radius) 
 
 } // namespace
 
+Mat cholesky(const Mat& q) {
+    Mat l = Mat::Zero();
+    l(0, 0) = std::sqrt(q(0, 0));
+    l(1, 0) = q(1, 0) / l(0, 0);
+    l(2, 0) = q(2, 0) / l(0, 0);
+    l(1, 1) = std::sqrt(q(1, 1) - l(1, 0) * l(1, 0));
+    l(2, 1) = (q(2, 1) - l(2, 0) * l(1, 0)) / l(1, 1);
+    l(2, 2) = std::sqrt(q(2, 2) - l(2, 0) * l(2, 0) - l(2, 1) * l(2, 1));
+    return l;
+}
+
 Fit::Fit(const Vec& c, const Mat& lower) : center(c), factor(lower) {
     inverse = Mat::Zero();
     inverse(0, 0) = 1 / lower(0, 0);
@@ -78,6 +77,12 @@ Fit::Fit(const Vec& c, const Mat& lower) : center(c), factor(lower) {
 
 Fit::Fit(const Ellipsoid& e)
     : Fit(to_vec(e.center), (Mat() << e.l11, 0, 0, e.l21, e.l22, 0, e.l31, e.l32, e.l33).finished()) {}
+
+Ellipsoid Fit::ellipsoid() const {
+    const auto f = [](double x) { return static_cast<float>(x); };
+    return {{f(center.x()), f(center.y()), f(center.z())}, f(factor(0, 0)), f(factor(1, 0)), f(factor(1, 1)),
+            f(factor(2, 0)), f(factor(2, 1)), f(factor(2, 2))};
+}
 
 double Fit::volume() const {
     return 4.0 / 3.0 * std::numbers::pi * factor(0, 0) * factor(1, 1) * factor(2, 2);
@@ -116,8 +121,8 @@ bool within_caps(const Fit& fit, double min_radius) {
     const double inverse = fit.inverse.norm();
     if (fit.factor.norm() * inverse <= kMaxAxisRatio && inverse * min_radius <= 1) return true;
     const Eigen3x3 axes = eigen_of(fit.factor * fit.factor.transpose());
-    return axes.values[2] * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] &&
-           axes.values[2] >= min_radius * min_radius;
+    const double thinnest = axes.values[2] * (1 + 1e-9); // capped() itself gets there only up to rounding
+    return thinnest * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] && thinnest >= min_radius * min_radius;
 }
 
 Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double tolerance) {
@@ -145,16 +150,29 @@ Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double to
         for (const size_t i : {low, high})
             if (weight[i] == 0) weight[i] = 1, ++started;
     }
-    Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
-    for (size_t i = 0; i < n; ++i)
-        if (weight[i] > 0) {
-            weight[i] = 1 / static_cast<double>(started);
-            moment += weight[i] * lifted[i] * lifted[i].transpose();
-        }
-    // Thin starts are legal; a trace of the identity keeps the inverse finite and dies out with the steps.
-    Eigen::Matrix4d inverse = (moment + 1e-9 * Eigen::Matrix4d::Identity()).inverse();
+    Eigen::Matrix4d inverse;
     std::vector<double> kappa(n); // lifted^T inverse lifted: 4 on the boundary of the optimum, less inside
-    for (size_t i = 0; i < n; ++i) kappa[i] = lifted[i].dot(inverse * lifted[i]);
+    const auto start = [&] {
+        Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
+        for (size_t i = 0; i < n; ++i)
+            if (weight[i] > 0) {
+                weight[i] = 1 / static_cast<double>(started);
+                moment += weight[i] * lifted[i] * lifted[i].transpose();
+            }
+        // Thin starts are legal; a trace of the identity keeps the inverse finite and dies out with the steps.
+        inverse = (moment + 1e-9 * Eigen::Matrix4d::Identity()).inverse();
+        double sum = 0; // of the weighted kappas: the trace of the unit matrix, unless the moments are singular
+        for (size_t i = 0; i < n; ++i) {
+            kappa[i] = lifted[i].dot(inverse * lifted[i]);
+            sum += weight[i] * kappa[i];
+        }
+        return std::abs(sum - kDimension) < 0.1;
+    };
+    if (!start()) { // the extreme points lie in a plane; all of them together do not
+        std::fill(weight.begin(), weight.end(), 1.0);
+        started = n;
+        start();
+    }
 
     for (int iteration = 0; iteration < 400; ++iteration) {
         size_t far = 0, near = n;

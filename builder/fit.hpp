@@ -23,15 +23,17 @@ struct Fit {
     Fit() = default;
     Fit(const Vec& c, const Mat& lower);
     explicit Fit(const Ellipsoid& e);
+    /// Rounded to float.
+    Ellipsoid ellipsoid() const;
 
-    /// Squared radial coordinate |L^-1 (p - center)|^2: at most 1 inside.
-    double radial_squared(const Vec& p) const {
+    /// Unit-ball coordinates L^-1 (p - center).
+    Vec radial(const Vec& p) const {
         const Vec d = p - center;
-        const double y1 = inverse(0, 0) * d.x();
-        const double y2 = inverse(1, 0) * d.x() + inverse(1, 1) * d.y();
-        const double y3 = inverse(2, 0) * d.x() + inverse(2, 1) * d.y() + inverse(2, 2) * d.z();
-        return y1 * y1 + y2 * y2 + y3 * y3;
+        return {inverse(0, 0) * d.x(), inverse(1, 0) * d.x() + inverse(1, 1) * d.y(),
+                inverse(2, 0) * d.x() + inverse(2, 1) * d.y() + inverse(2, 2) * d.z()};
     }
+    /// Squared radial coordinate |L^-1 (p - center)|^2: at most 1 inside.
+    double radial_squared(const Vec& p) const { return radial(p).squaredNorm(); }
     double volume() const;
     /// Half extents of the bounding box.
     Vec half_extents() const { return factor.rowwise().norm(); }
@@ -41,11 +43,14 @@ struct Fit {
     double reach(std::span<const Vec> points) const;
 };
 
+/// Lower Cholesky factor of the symmetric positive definite `q`, in a fixed order of operations.
+Mat cholesky(const Mat& q);
+
 /// Ellipsoid with the shape matrix `q` (symmetric positive definite), its axis ratio brought down to kMaxAxisRatio and
 /// its radii up to `min_radius` by lengthening short axes.
 Fit capped(const Vec& center, const Mat& q, double min_radius);
 
-/// Does `fit` keep to those bounds?
+/// Does `fit` keep to those bounds, up to rounding? What capped() returns does.
 bool within_caps(const Fit& fit, double min_radius);
 
 /// Minimum-volume ellipsoid around `points` (any number above 0, also coplanar or equal ones), capped, to a relative

@@ -2,286 +2,521 @@
 
 #include "builder/random.hpp"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <chrono>
-#include <map>
-#include <mutex>
+#include <cmath>
 #include <numeric>
-#include <set>
 
 namespace prolate {
 namespace {
 
+constexpr uint32_t kNobody = UINT32_MAX;
 constexpr uint32_t kMaxLeaves = 65536;
+constexpr uint32_t kMergeLimit = 64;       // clusters, up to which merging is a start; it costs more than it gives above
+constexpr uint32_t kFew = 16;              // ellipsoids, up to which it is the first choice
+constexpr uint32_t kManyStarts = 64;       // children of one parent, below which there are more starts than usual,
+constexpr int kMostStarts = 4;             // up to so many times
+constexpr uint32_t kPiecesPerCluster[] = {16, 32, 8, 24, 12}; // of the merging starts, in turn
+constexpr double kUncoveredWeight = 50;    // per volume outside, when descents are compared
+constexpr double kShapeScale = 0.35;       // Objective::scale, in sides of a cube with an ellipsoid's share of the solid
+constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
+constexpr double kReheat = 10;             // kappa at the start of a cycle
+constexpr double kLeastGain = 0.999;       // a level must bring the outside volume down to less than this much
 
 class Grower {
 public:
-    Grower(const Voxels& voxels, const GrowOptions& options) : voxels_(voxels), options_(options) {}
+    Grower(const Solid& solid, const GrowOptions& options)
+        : solid_(solid), pieces_(solid.pieces), options_(options), solid_volume_(solid.columns.volume().value),
+          started_(Clock::now()) {}
 
     Grown run() {
-        std::vector<uint32_t> all(voxels_.cell_count());
-        std::iota(all.begin(), all.end(), 0u);
-        const Fit root = fit_cells(voxels_, all, options_.split.min_radius);
-        add({root, std::move(all)}, 0, 0);
-
+        grow_root();
         const BuildOptions& goal = options_.build;
         if (goal.ellipsoids)
-            grow_to_count(goal.ellipsoids);
+            grow_upwards(goal.ellipsoids > 1 ? solve_flat(goal.ellipsoids, [this](double done) { report(done); })
+                                             : std::vector<Leaf>{});
         else if (goal.tolerance > 0)
-            grow_to_tolerance(goal.tolerance);
+            grow_upwards(meet_tolerance(goal.tolerance));
         else
-            grow_to_level(goal.levels ? goal.levels : 3);
+            grow_downwards(goal.levels ? goal.levels : 3);
+        if (!cancelled()) tidy();
         return std::move(grown_);
     }
 
 private:
     using Clock = std::chrono::steady_clock;
 
-    bool cancelled() const { return options_.split.cancelled->load(std::memory_order_relaxed); }
+    // A set of ellipsoids that covers, and which piece belongs to which.
+    struct Solved {
+        EllipsoidSet set;
+        std::vector<uint32_t> owner; // of each piece
+        double outside = HUGE_VAL;   // cubic metres
+    };
+    // What a set is made for: some parents, each with its cells and the number of children it is to have.
+    struct Task {
+        std::vector<std::vector<uint32_t>> cells; // of each parent, rising
+        uint32_t children;
+        std::vector<std::vector<Fit>> chains; // see EllipsoidSet; empty if the one parent limits nothing
+    };
 
-    // A leaf that splitting can make finer.
-    bool splittable(uint32_t leaf) const {
-        const GrownNode& node = grown_.nodes[leaf];
-        return node.level + 1 < kMaxLevels && node.cluster.cells.size() > 1 && !exhausted_.contains(leaf);
+    bool cancelled() const { return options_.cancelled->load(std::memory_order_relaxed); }
+    void report(double done) const {
+        if (options_.progress) options_.progress(done, static_cast<uint32_t>(grown_.nodes.size()));
+    }
+    void end_level(uint32_t level) {
+        if (grown_.seconds.size() <= level) grown_.seconds.resize(level + 1, 0);
+        const auto now = Clock::now();
+        grown_.seconds[level] += std::chrono::duration<double>(now - started_).count();
+        started_ = now;
     }
 
-    std::vector<uint32_t> leaves() const {
-        std::vector<uint32_t> out;
-        for (uint32_t i = 0; i < grown_.nodes.size(); ++i)
-            if (grown_.nodes[i].child_count == 0) out.push_back(i);
+    Objective objective(size_t count) const {
+        const double volume = std::max(solid_volume_, 1e-9 * std::pow(solid_.field.pitch(), 3));
+        return {double{options_.build.alpha}, double{options_.build.beta},
+                kShapeScale * std::cbrt(volume / static_cast<double>(count))};
+    }
+
+    void grow_root() {
+        GrownNode root;
+        root.pieces.resize(pieces_.size());
+        std::iota(root.pieces.begin(), root.pieces.end(), 0u);
+        root.fit = fit_pieces(pieces_, root.pieces, options_.min_radius);
+        if (options_.build.primitive == Primitive::sphere) {
+            EllipsoidSet one{{as_primitive(root.fit, Primitive::sphere)}, {}, {}};
+            polish_set(one);
+            root.fit = one.fits[0];
+        }
+        grown_.nodes.push_back(std::move(root));
+        end_level(0);
+    }
+
+    // --- one set ----------------------------------------------------------------------------------------------------
+
+    Solved solve(const Task& task, const std::function<void(double)>& progress) {
+        Effort effort = options_.effort;
+        if (task.cells.size() == 1) // few ellipsoids cost little, and more depends on where they start
+            effort.starts *= std::clamp(static_cast<int>(kManyStarts / task.children), 1, kMostStarts);
+        const int rounds = effort.starts + effort.cycles;
+        EllipsoidSet best;
+        std::vector<uint32_t> best_owner;
+        double least = HUGE_VAL;
+        gather_points(task);
+        for (int start = 0; start < effort.starts && !cancelled(); ++start) {
+            std::vector<uint32_t> owner;
+            EllipsoidSet set = start_set(task, start, owner);
+            descend_set(set, owner, effort.iterations, 1, static_cast<uint64_t>(start),
+                        [&](double done) { progress(0.9 * (start + done) / rounds); });
+            const double error = approximate_error(set);
+            if (error < least || best.fits.empty())
+                least = error, best = std::move(set), best_owner = std::move(owner);
+        }
+        for (int cycle = 0; cycle < effort.cycles && !cancelled(); ++cycle) {
+            EllipsoidSet set = best;
+            descend_set(set, best_owner, effort.iterations / 2, kReheat, static_cast<uint64_t>(effort.starts + cycle),
+                        [&](double done) { progress(0.9 * (effort.starts + cycle + done) / rounds); });
+            const double error = approximate_error(set);
+            if (error < least) least = error, best = std::move(set);
+        }
+        if (cancelled()) return {};
+        refine_seams(pieces_, best);
+        Solved out{std::move(best), {}, 0};
+        out.owner = polish_set(out.set);
+        out.outside = outside_of(out.set.fits);
         return out;
     }
 
-    void add(Cluster cluster, uint32_t level, uint32_t parent) {
-        GrownNode node;
-        node.level = level;
-        node.parent = parent;
-        node.outside = outside_volume(cluster.fit, voxels_);
-        node.surface_error = surface_error(cluster.fit, voxels_, cluster.cells);
-        node.cluster = std::move(cluster);
-        grown_.nodes.push_back(std::move(node));
+    double approximate_error(const EllipsoidSet& set) const {
+        const CoverVolume volume = measure(set.fits);
+        const double uncovered = volume.solid.value - (volume.whole.value - volume.outside.value);
+        return volume.outside.value + kUncoveredWeight * uncovered;
     }
 
-    // Splits each node of `parents` into up to degrees[i] children; `share` maps the round's progress to the whole.
-    template <class Share>
-    void split_all(const std::vector<uint32_t>& parents, const std::vector<uint32_t>& degrees, Share&& share) {
-        const auto start = Clock::now();
-        std::vector<Split> children(parents.size());
-        size_t done_cells = 0, all_cells = 0;
-        for (const uint32_t p : parents) all_cells += grown_.nodes[p].cluster.cells.size();
-        auto made = static_cast<uint32_t>(grown_.nodes.size());
-        std::mutex reporting;
-        // Largest first, so that the last one running is small.
-        std::vector<size_t> order(parents.size());
-        std::iota(order.begin(), order.end(), size_t{0});
-        std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-            return grown_.nodes[parents[a]].cluster.cells.size() > grown_.nodes[parents[b]].cluster.cells.size();
-        });
-        tbb::parallel_for(
-            tbb::blocked_range<size_t>(0, order.size(), 1),
-            [&](const tbb::blocked_range<size_t>& range) {
-                for (size_t o = range.begin(); o != range.end(); ++o) {
-                    if (cancelled()) return;
-                    const size_t i = order[o];
-                    const std::vector<uint32_t>& cells = grown_.nodes[parents[i]].cluster.cells;
-                    SplitOptions own = options_.split;
-                    own.seed = Random(own.seed + parents[i]).bits();
-                    // At the root a bad start costs most, and it has all the threads.
-                    if (parents.size() > 1) own.starts = (own.starts + 1) / 2;
-                    const auto report = [&](double part_of_this) {
-                        if (!options_.progress) return;
-                        const std::lock_guard lock(reporting);
-                        const double part =
-                            static_cast<double>(done_cells) + part_of_this * static_cast<double>(cells.size());
-                        options_.progress(share(part / static_cast<double>(all_cells)), made);
-                    };
-                    own.progress = report;
-                    children[i] = split(voxels_, cells, degrees[i], own);
-                    {
-                        const std::lock_guard lock(reporting);
-                        done_cells += cells.size(), made += static_cast<uint32_t>(children[i].clusters.size());
-                    }
-                    report(0);
-                }
-            },
-            tbb::simple_partitioner());
-        if (cancelled()) return;
-        uint32_t deepest = 0;
-        for (size_t i = 0; i < parents.size(); ++i) {
-            // Nothing gained, as for a ball: stays a leaf and is not tried again - unless the count is all that
-            // matters.
-            const Split& split = children[i];
-            const bool gains = split.outside < grown_.nodes[parents[i]].outside || options_.build.ellipsoids > 0;
-            if (split.clusters.size() < 2 || !gains) {
-                exhausted_.insert(parents[i]);
-                continue;
-            }
-            const uint32_t level = grown_.nodes[parents[i]].level + 1;
-            grown_.nodes[parents[i]].first_child = static_cast<uint32_t>(grown_.nodes.size());
-            grown_.nodes[parents[i]].child_count = static_cast<uint32_t>(split.clusters.size());
-            for (Cluster& child : children[i].clusters) add(std::move(child), level, parents[i]);
-            deepest = std::max(deepest, level);
-        }
-        if (grown_.seconds.size() <= deepest) grown_.seconds.resize(deepest + 1);
-        grown_.seconds[deepest] += std::chrono::duration<double>(Clock::now() - start).count();
+    CoverVolume measure(std::span<const Fit> fits) const {
+        std::vector<Ellipsoid> ellipsoids;
+        for (const Fit& fit : fits) ellipsoids.push_back(fit.ellipsoid());
+        return measure_cover(solid_.columns, ellipsoids);
     }
+    double outside_of(std::span<const Fit> fits) const { return measure(fits).outside.value; }
 
-    void grow_to_level(uint32_t levels) {
-        for (uint32_t level = 0; level < levels && !cancelled(); ++level) {
-            std::vector<uint32_t> parents;
-            for (const uint32_t leaf : leaves())
-                if (grown_.nodes[leaf].level == level && splittable(leaf)) parents.push_back(leaf);
-            if (parents.empty()) {
-                grown_.goal_reached = false; // no leaf can be improved
-                return;
-            }
-            const auto before = static_cast<uint32_t>(grown_.nodes.size());
-            split_all(parents, std::vector<uint32_t>(parents.size(), options_.build.degree),
-                      [&](double done) { return (level + done / 2) / levels; });
-            if (level > 0) optimise_level(before, [&](double done) { return (level + 0.5 + done / 2) / levels; });
-        }
-    }
-
-    // The nodes from `first` on, all of one level, once more together: now each sees the others' volume, not only its
-    // siblings', and may own any cell that its parent's ellipsoid holds and its parent might have owned. That is still
-    // a hierarchy: cells move with their node from one parent to another, and every ancestor covers what it is given.
-    template <class Share> void optimise_level(uint32_t first, Share&& share) {
-        const auto end = static_cast<uint32_t>(grown_.nodes.size());
-        if (end - first < 2 || cancelled()) return;
-        const auto start = Clock::now();
-        std::vector<uint32_t> cells;
-        std::vector<Cluster> clusters;
-        for (uint32_t n = first; n < end; ++n) {
-            clusters.push_back(grown_.nodes[n].cluster);
-            cells.insert(cells.end(), clusters.back().cells.begin(), clusters.back().cells.end());
-        }
-        std::sort(cells.begin(), cells.end());
-        std::map<uint32_t, std::vector<uint32_t>> by_parent;
-        std::vector<Domain> domains;
-        for (uint32_t n = first; n < end; ++n) {
-            const auto [domain, fresh] = by_parent.try_emplace(grown_.nodes[n].parent);
-            if (fresh) domain->second = held_by_ancestors(n, cells);
-            domains.push_back(domain->second);
-        }
-        SplitOptions own = options_.split;
-        own.seed = Random(own.seed + first).bits();
-        own.progress = [&](double done) {
-            if (options_.progress) options_.progress(share(done), end);
+    EllipsoidSet start_set(const Task& task, int start, std::vector<uint32_t>& owner) const {
+        const bool few = task.children <= kFew && task.cells.size() == 1;
+        const bool merging = task.children <= kMergeLimit && (start % 2 == 0) == few;
+        const auto seed = options_.build.seed + static_cast<uint64_t>(start);
+        const uint32_t pieces_per_cluster =
+            kPiecesPerCluster[static_cast<size_t>(start) / 2 % std::size(kPiecesPerCluster)];
+        const std::function<double(const Fit&)> outside = [this](const Fit& fit) {
+            return solid_.outside ? solid_.outside(fit).volume : sampled_outside_volume(fit, solid_.field);
         };
-        Split joint = optimise(voxels_, cells, clusters, domains, own);
-        if (!cancelled()) replace(first, std::move(joint.clusters));
-        grown_.seconds.back() += std::chrono::duration<double>(Clock::now() - start).count();
+        std::vector<std::vector<Cluster>> clusters(task.cells.size());
+        tbb::parallel_for(size_t{0}, task.cells.size(), [&](size_t p) {
+            if (merging)
+                clusters[p] = merge_start(solid_.cells, task.cells[p], task.children, pieces_per_cluster,
+                                          options_.min_radius, outside);
+            else
+                clusters[p] = spread_start(solid_.cells, task.cells[p], task.children, seed, options_.min_radius);
+        });
+        EllipsoidSet set;
+        set.chains = task.chains;
+        std::vector<uint32_t> of_cell(solid_.cells.cell_count(), 0);
+        for (uint32_t p = 0; p < clusters.size(); ++p)
+            for (const Cluster& cluster : clusters[p]) {
+                for (const uint32_t cell : cluster.cells) of_cell[cell] = static_cast<uint32_t>(set.fits.size());
+                set.fits.push_back(as_primitive(cluster.fit, options_.build.primitive));
+                if (!task.chains.empty()) set.parent.push_back(p);
+            }
+        owner.resize(points_.size());
+        for (size_t p = 0; p < points_.size(); ++p) {
+            const uint32_t cell = solid_.cells.cell_at(points_[p]);
+            owner[p] = cell == Voxels::kNoCell ? 0 : of_cell[cell];
+        }
+        return set;
     }
 
-    // Positions of the cells that every ancestor of `node` covers.
-    std::vector<uint32_t> held_by_ancestors(uint32_t node, std::span<const uint32_t> cells) const {
-        std::vector<uint32_t> out(cells.size());
-        std::iota(out.begin(), out.end(), 0u);
-        while (node != 0) {
-            node = grown_.nodes[node].parent;
-            const Cluster& ancestor = grown_.nodes[node].cluster;
-            std::erase_if(out, [&](uint32_t c) {
-                return !std::binary_search(ancestor.cells.begin(), ancestor.cells.end(), cells[c]) &&
-                       ancestor.fit.reach(voxels_.points(cells[c])) > 1;
+    void gather_points(const Task& task) {
+        size_t all = 0;
+        for (uint32_t piece = 0; piece < pieces_.size(); ++piece)
+            pieces_.for_each_surface_point(piece, [&](const Vec&) { ++all; });
+        const double ellipsoids = static_cast<double>(task.children) * static_cast<double>(task.cells.size());
+        const auto wanted = static_cast<size_t>(std::max(kLeastPoints, kPointsPerEllipsoid * ellipsoids));
+        const size_t stride = std::max<size_t>(1, all / wanted);
+        points_.clear();
+        size_t at = 0;
+        for (uint32_t piece = 0; piece < pieces_.size(); ++piece)
+            pieces_.for_each_surface_point(piece, [&](const Vec& p) {
+                if (at++ % stride == 0) points_.push_back(p);
             });
-        }
+    }
+
+    void descend_set(EllipsoidSet& set, std::vector<uint32_t> owner, int iterations, double kappa, uint64_t seed,
+                     const std::function<void(double)>& progress) const {
+        const size_t n = set.fits.size();
+        DescentOptions options{objective(n),
+                               options_.build.primitive,
+                               iterations,
+                               static_cast<int>(std::clamp(800 / std::sqrt(static_cast<double>(n)), 96.0, 384.0)),
+                               options_.min_radius,
+                               n > kFew,
+                               kappa,
+                               Random(options_.build.seed + seed).bits(),
+                               options_.cancelled,
+                               progress};
+        descend(set, solid_.field, points_, std::move(owner), options);
+    }
+
+    std::vector<uint32_t> polish_set(EllipsoidSet& set) const {
+        const PolishOptions options{objective(set.fits.size()),
+                                    options_.build.primitive,
+                                    options_.effort.sweeps,
+                                    256,
+                                    options_.min_radius,
+                                    solid_.outside,
+                                    [this](std::span<const Fit> fits) { return outside_of(fits); },
+                                    options_.build.seed,
+                                    options_.cancelled};
+        return polish(set, pieces_, solid_.field, options);
+    }
+
+    std::vector<uint32_t> all_cells() const {
+        std::vector<uint32_t> out(solid_.cells.cell_count());
+        std::iota(out.begin(), out.end(), 0u);
         return out;
     }
 
-    // Gives the nodes from `first` on, all leaves of one level, new clusters, drops those without cells, and lets their
-    // ancestors own what they own. Does nothing if a parent would lose all of its children.
-    void replace(uint32_t first, std::vector<Cluster> clusters) {
-        std::map<uint32_t, std::vector<size_t>> kept; // by parent
-        for (size_t i = 0; i < clusters.size(); ++i) {
-            std::vector<size_t>& children = kept[grown_.nodes[first + i].parent];
-            if (!clusters[i].cells.empty()) children.push_back(i);
-        }
-        for (const auto& [parent, children] : kept)
-            if (children.empty()) return;
-        const uint32_t level = grown_.nodes[first].level;
-        grown_.nodes.resize(first);
-        for (const auto& [parent, children] : kept) {
-            grown_.nodes[parent].first_child = static_cast<uint32_t>(grown_.nodes.size());
-            grown_.nodes[parent].child_count = static_cast<uint32_t>(children.size());
-            for (const size_t i : children) add(std::move(clusters[i]), level, parent);
-        }
-        for (uint32_t n = first; n-- > 0;) { // children come after their parents
-            GrownNode& node = grown_.nodes[n];
-            if (node.child_count == 0) continue;
-            node.cluster.cells.clear();
-            for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c)
-                node.cluster.cells.insert(node.cluster.cells.end(), grown_.nodes[c].cluster.cells.begin(),
-                                          grown_.nodes[c].cluster.cells.end());
-            std::sort(node.cluster.cells.begin(), node.cluster.cells.end());
-        }
-    }
+    // --- downwards --------------------------------------------------------------------------------------------------
 
-    // The leaves that stick out most: all within a factor of 2 of the worst, so that a round has work for every thread.
-    std::vector<uint32_t> worst_leaves() const {
-        std::vector<uint32_t> out;
-        for (const uint32_t leaf : leaves())
-            if (splittable(leaf)) out.push_back(leaf);
-        std::stable_sort(out.begin(), out.end(),
-                         [&](uint32_t a, uint32_t b) { return grown_.nodes[a].outside > grown_.nodes[b].outside; });
-        size_t keep = 0;
-        while (keep < out.size() && grown_.nodes[out[keep]].outside >= 0.5 * grown_.nodes[out[0]].outside) ++keep;
-        out.resize(keep);
-        return out;
-    }
-
-    void grow_to_count(uint32_t count) {
-        auto leaf_count = static_cast<uint32_t>(leaves().size());
-        while (leaf_count < count && !cancelled()) {
-            std::vector<uint32_t> parents = worst_leaves();
-            if (parents.empty()) {
+    void grow_downwards(uint32_t levels) {
+        std::vector<uint32_t> parents{0};
+        double outside = outside_of({&grown_.nodes[0].fit, 1});
+        double done = 0, all = 0; // work, in nodes
+        for (uint32_t l = 1; l <= levels; ++l) all += std::pow(options_.build.degree, l);
+        for (uint32_t level = 1; level <= levels && !cancelled(); ++level) {
+            const double share = std::pow(options_.build.degree, level);
+            const uint32_t piece_count = pieces_.size();
+            const Solved solved = solve(task_below(parents), [&](double part) { report((done + part * share) / all); });
+            done += share;
+            if (cancelled()) return;
+            if (solved.outside >= kLeastGain * outside) { // as for a ball
                 grown_.goal_reached = false;
+                follow_cuts(piece_count);
                 return;
             }
-            std::vector<uint32_t> degrees; // a split into d adds d - 1 leaves
-            uint32_t missing = count - leaf_count;
-            for (size_t i = 0; i < parents.size() && missing > 0; ++i) {
-                degrees.push_back(std::min(options_.build.degree, missing + 1));
-                missing -= degrees.back() - 1;
-            }
-            parents.resize(degrees.size());
-            split_all(parents, degrees, [&](double) { return static_cast<double>(leaf_count) / count; });
-            leaf_count = static_cast<uint32_t>(leaves().size());
+            outside = solved.outside;
+            parents = attach(solved, parents);
+            end_level(level);
         }
     }
 
-    void grow_to_tolerance(double tolerance) {
-        double first = 0;
-        while (!cancelled()) {
+    Task task_below(const std::vector<uint32_t>& parents) const {
+        Task task;
+        task.children = options_.build.degree;
+        if (parents.size() == 1 && parents[0] == 0) {
+            task.cells = {all_cells()};
+            return task;
+        }
+        for (const uint32_t p : parents) { // the root covers everything: it is no limit
+            task.chains.emplace_back();
+            for (uint32_t node = p; node != 0; node = grown_.nodes[node].parent)
+                task.chains.back().push_back(grown_.nodes[node].fit);
+        }
+        task.cells = share_cells(parents);
+        return task;
+    }
+
+    // Each cell to the parent that has it most centrally.
+    std::vector<std::vector<uint32_t>> share_cells(const std::vector<uint32_t>& parents) const {
+        const Voxels& cells = solid_.cells;
+        std::vector<uint32_t> owner(cells.cell_count(), kNobody);
+        std::vector<double> nearest(cells.cell_count(), HUGE_VAL);
+        const auto offer = [&](uint32_t p, uint32_t cell) {
+            const Fit& fit = grown_.nodes[parents[p]].fit;
+            const double radial = fit.radial_squared(cells.box(cell).center());
+            if (radial < nearest[cell]) nearest[cell] = radial, owner[cell] = p;
+        };
+        for (uint32_t p = 0; p < parents.size(); ++p) {
+            const Fit& fit = grown_.nodes[parents[p]].fit;
+            const Vec half = fit.half_extents();
+            cells.for_each_in({fit.center - half, fit.center + half}, [&](uint32_t cell) { offer(p, cell); });
+        }
+        std::vector<std::vector<uint32_t>> out(parents.size());
+        for (uint32_t cell = 0; cell < cells.cell_count(); ++cell) {
+            if (owner[cell] == kNobody)
+                for (uint32_t p = 0; p < parents.size(); ++p) offer(p, cell);
+            out[owner[cell]].push_back(cell);
+        }
+        return out;
+    }
+
+    // Makes nodes of the ellipsoids that own something, as children of `parents`, whose pieces become their children's.
+    // Returns the new nodes.
+    std::vector<uint32_t> attach(const Solved& solved, const std::vector<uint32_t>& parents) {
+        std::vector<std::vector<uint32_t>> pieces(solved.set.fits.size());
+        for (uint32_t piece = 0; piece < solved.owner.size(); ++piece) pieces[solved.owner[piece]].push_back(piece);
+        for (const uint32_t p : parents) grown_.nodes[p].pieces.clear();
+        std::vector<uint32_t> added;
+        for (uint32_t p = 0; p < parents.size(); ++p) {
+            grown_.nodes[parents[p]].first_child = static_cast<uint32_t>(grown_.nodes.size());
+            for (size_t i = 0; i < pieces.size(); ++i) {
+                if (pieces[i].empty() || (solved.set.parent.empty() ? 0 : solved.set.parent[i]) != p) continue;
+                added.push_back(static_cast<uint32_t>(grown_.nodes.size()));
+                GrownNode node;
+                node.fit = solved.set.fits[i];
+                node.level = grown_.nodes[parents[p]].level + 1;
+                node.parent = parents[p];
+                node.pieces = pieces[i];
+                grown_.nodes.push_back(std::move(node));
+                ++grown_.nodes[parents[p]].child_count;
+            }
+        }
+        return added;
+    }
+
+    // Pieces that were cut since `count` there were belong to whom their wholes belong.
+    void follow_cuts(uint32_t count) {
+        std::vector<uint32_t> leaf(pieces_.size(), kNobody);
+        for (uint32_t n = 0; n < grown_.nodes.size(); ++n)
+            for (const uint32_t piece : grown_.nodes[n].pieces) leaf[piece] = n;
+        for (uint32_t piece = count; piece < pieces_.size(); ++piece) {
+            leaf[piece] = leaf[pieces_.cut_from(piece)];
+            grown_.nodes[leaf[piece]].pieces.push_back(piece);
+        }
+    }
+
+    // Drops nodes that own nothing, and lets each node own what its children do.
+    void tidy() {
+        std::vector<GrownNode>& nodes = grown_.nodes;
+        if (nodes.size() == 1) {
+            nodes[0].pieces.resize(pieces_.size());
+            std::iota(nodes[0].pieces.begin(), nodes[0].pieces.end(), 0u);
+            return;
+        }
+        for (uint32_t n = static_cast<uint32_t>(nodes.size()); n-- > 1;) // children come after their parents
+            nodes[nodes[n].parent].pieces.insert(nodes[nodes[n].parent].pieces.end(), nodes[n].pieces.begin(),
+                                                 nodes[n].pieces.end());
+        std::vector<uint32_t> renumbered(nodes.size(), kNobody);
+        std::vector<GrownNode> kept;
+        for (uint32_t n = 0; n < nodes.size(); ++n) {
+            if (nodes[n].pieces.empty()) continue;
+            renumbered[n] = static_cast<uint32_t>(kept.size());
+            kept.push_back(std::move(nodes[n]));
+            GrownNode& node = kept.back();
+            node.child_count = 0;
+            std::sort(node.pieces.begin(), node.pieces.end());
+            node.parent = renumbered[node.parent];
+            if (renumbered[n] == 0) continue;
+            GrownNode& parent = kept[node.parent];
+            if (parent.child_count++ == 0) parent.first_child = renumbered[n];
+        }
+        nodes.swap(kept);
+    }
+
+    // --- upwards ----------------------------------------------------------------------------------------------------
+
+    struct Leaf {
+        Fit fit;
+        std::vector<uint32_t> pieces;
+    };
+
+    std::vector<Leaf> solve_flat(uint32_t count, const std::function<void(double)>& progress) {
+        Task task;
+        task.children = count;
+        task.cells = {all_cells()};
+        const Solved solved = solve(task, progress);
+        if (cancelled()) return {};
+        std::vector<Leaf> leaves(solved.set.fits.size());
+        for (size_t i = 0; i < leaves.size(); ++i) leaves[i].fit = solved.set.fits[i];
+        for (uint32_t piece = 0; piece < solved.owner.size(); ++piece)
+            leaves[solved.owner[piece]].pieces.push_back(piece);
+        std::erase_if(leaves, [](const Leaf& leaf) { return leaf.pieces.empty(); });
+        while (leaves.size() < count) {
+            // Some were redundant. Halve the largest, and then the next: the count is what was asked for.
+            const auto largest = std::max_element(leaves.begin(), leaves.end(), [](const Leaf& a, const Leaf& b) {
+                return (a.pieces.size() > 1 ? a.fit.volume() : 0) < (b.pieces.size() > 1 ? b.fit.volume() : 0);
+            });
+            if (largest->pieces.size() < 2) {
+                grown_.goal_reached = false;
+                break;
+            }
+            const auto place = [&](uint32_t piece) { return pieces_.center(piece); };
+            auto [a, b] = divide(largest->pieces, place, largest->pieces.size() / 2);
+            *largest = {fit_around(a), a};
+            leaves.push_back({fit_around(b), b});
+        }
+        return leaves;
+    }
+
+    Fit fit_around(std::span<const uint32_t> pieces) const {
+        const Fit fit = as_primitive(fit_pieces(pieces_, pieces, options_.min_radius), options_.build.primitive);
+        double reach = 0;
+        for (const uint32_t piece : pieces) reach = std::max(reach, fit.reach(pieces_.points(piece)));
+        return fit.scaled(reach);
+    }
+
+    // The lower `count` of `items` along the longest side of their places' box, and the rest.
+    template <class Place>
+    static std::pair<std::vector<uint32_t>, std::vector<uint32_t>> divide(std::vector<uint32_t> items, Place&& place,
+                                                                          size_t count) {
+        Box box;
+        for (const uint32_t item : items) box.add(place(item));
+        int axis = 0;
+        box.size().maxCoeff(&axis);
+        std::stable_sort(items.begin(), items.end(),
+                         [&](uint32_t a, uint32_t b) { return place(a)[axis] < place(b)[axis]; });
+        const auto middle = items.begin() + static_cast<std::ptrdiff_t>(count);
+        return {{items.begin(), middle}, {middle, items.end()}};
+    }
+
+    // The fewest leaves that meet the tolerance, to about a tenth: the ratio falls about like a power of the count.
+    std::vector<Leaf> meet_tolerance(double tolerance) {
+        uint32_t low = 1, count = 8; // low: known to be too few
+        double low_ratio = outside_of({&grown_.nodes[0].fit, 1}) / solid_volume_;
+        std::vector<Leaf> best;
+        for (int round = 0; round < 12 && !cancelled(); ++round) {
+            std::vector<Leaf> leaves = solve_flat(count, [&](double part) { report((round + part) / 12); });
+            if (cancelled()) return {};
             std::vector<Fit> fits;
-            for (const uint32_t leaf : leaves()) fits.push_back(grown_.nodes[leaf].cluster.fit);
-            const double ratio = options_.outside_ratio(fits);
-            if (ratio <= tolerance) return;
-            if (first == 0) first = ratio;
-            const std::vector<uint32_t> parents = worst_leaves();
-            if (parents.empty() || fits.size() >= kMaxLeaves) {
-                grown_.goal_reached = false;
-                return;
+            for (const Leaf& leaf : leaves) fits.push_back(leaf.fit);
+            const double ratio = outside_of(fits) / solid_volume_;
+            const double steepness = std::clamp(
+                std::log(low_ratio / ratio) / std::log(static_cast<double>(count) / low), 0.4, 1.5);
+            if (ratio > tolerance) {
+                if (count == kMaxLeaves || leaves.size() < count || (!best.empty() && count * 1.1 >= static_cast<double>(best.size()))) {
+                    if (best.empty()) grown_.goal_reached = false, best = std::move(leaves);
+                    return best;
+                }
+                low = count, low_ratio = ratio;
+            } else {
+                best = std::move(leaves);
+                if (count <= low * 1.1 + 1) return best;
             }
-            // The ratio falls about like a power of the count: its logarithm measures the way gone.
-            const double gone = std::clamp(std::log(first / ratio) / std::log(first / tolerance), 0.0, 1.0);
-            split_all(parents, std::vector<uint32_t>(parents.size(), options_.build.degree),
-                      [&](double) { return gone; });
+            const double guess = low * std::pow(low_ratio / (0.97 * tolerance), 1 / steepness);
+            const double most = best.empty() ? std::min<double>(kMaxLeaves, low * 8.0) : static_cast<double>(best.size()) - 1;
+            count = static_cast<uint32_t>(std::clamp(std::ceil(guess), low + 1.0, std::max(low + 1.0, most)));
         }
+        return best;
     }
 
-    const Voxels& voxels_;
+    // A tree over `leaves`: as many levels as the degree needs.
+    void grow_upwards(const std::vector<Leaf>& leaves) {
+        if (cancelled() || leaves.size() < 2) return;
+        std::vector<uint32_t> members(leaves.size());
+        std::iota(members.begin(), members.end(), 0u);
+        grown_.nodes[0].pieces.clear();
+        uint32_t height = 0;
+        for (size_t reach = 1; reach < leaves.size(); reach *= options_.build.degree) ++height;
+        // Breadth-first, so that the children of a node are consecutive.
+        std::vector<std::pair<uint32_t, std::vector<uint32_t>>> groups{{0, members}}; // a node and its leaves
+        for (uint32_t level = 1; level <= height; ++level) {
+            size_t reach = 1; // leaves that a node of this level can have
+            for (uint32_t l = level; l < height; ++l) reach *= options_.build.degree;
+            std::vector<std::pair<uint32_t, std::vector<uint32_t>>> next;
+            for (auto& [parent, own] : groups) {
+                if (own.size() < 2) continue;
+                const size_t children = std::min<size_t>(own.size(), options_.build.degree);
+                grown_.nodes[parent].first_child = static_cast<uint32_t>(grown_.nodes.size());
+                for (std::vector<uint32_t>& part : divided(leaves, std::move(own), children, reach)) {
+                    GrownNode node;
+                    node.level = level;
+                    node.parent = parent;
+                    if (part.size() == 1) {
+                        node.fit = leaves[part[0]].fit;
+                        node.pieces = leaves[part[0]].pieces;
+                    } else {
+                        std::vector<uint32_t> pieces;
+                        for (const uint32_t leaf : part)
+                            pieces.insert(pieces.end(), leaves[leaf].pieces.begin(), leaves[leaf].pieces.end());
+                        node.fit = fit_around(pieces);
+                    }
+                    next.emplace_back(static_cast<uint32_t>(grown_.nodes.size()), std::move(part));
+                    grown_.nodes.push_back(std::move(node));
+                    ++grown_.nodes[parent].child_count;
+                }
+            }
+            groups.swap(next);
+        }
+        end_level(height);
+    }
+
+    // `members` in `count` parts of at most `most` each, by halving.
+    static std::vector<std::vector<uint32_t>> divided(const std::vector<Leaf>& leaves, std::vector<uint32_t> members,
+                                                      size_t count, size_t most) {
+        if (count == 1) return {std::move(members)};
+        const size_t left = count / 2, right = count - left;
+        size_t cut = members.size() * left / count;
+        cut = std::clamp(cut, std::max(left, members.size() - std::min(members.size(), right * most)),
+                         std::min(left * most, members.size() - right));
+        auto [a, b] = divide(std::move(members), [&](uint32_t leaf) { return leaves[leaf].fit.center; }, cut);
+        std::vector<std::vector<uint32_t>> out = divided(leaves, std::move(a), left, most);
+        for (std::vector<uint32_t>& part : divided(leaves, std::move(b), right, most)) out.push_back(std::move(part));
+        return out;
+    }
+
+    const Solid& solid_;
+    Pieces& pieces_;
     const GrowOptions& options_;
     Grown grown_;
-    std::set<uint32_t> exhausted_; // leaves that a split could not improve
+    const double solid_volume_;
+    Clock::time_point started_;
+    std::vector<Vec> points_; // of the surface, to be covered
 };
 
 } // namespace
 
-Grown grow(const Voxels& voxels, const GrowOptions& options) {
-    return Grower(voxels, options).run();
+Effort effort_of(Quality quality) {
+    switch (quality) {
+    case Quality::fast:
+        return {64, 1, 300, 0, 4};
+    case Quality::normal:
+        return {96, 2, 500, 0, 8};
+    case Quality::best:
+        return {192, 3, 1500, 2, 12};
+    }
+    return effort_of(Quality::normal);
+}
+
+Grown grow(const Solid& solid, const GrowOptions& options) {
+    return Grower(solid, options).run();
 }
 
 } // namespace prolate

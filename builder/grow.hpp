@@ -1,7 +1,13 @@
-// The top-down loop (paper, Algorithm 1): from the root ellipsoid to all levels.
+// From the solid to a tree of ellipsoids (paper, Algorithm 1).
+//
+// A level is optimised as a whole, as a set: start, descent, polish. Levels are grown downwards when levels are asked
+// for - the ellipsoids of a level then see those above as limits, see EllipsoidSet - and upwards from the leaves when a
+// number of leaves or a tolerance is.
 #pragma once
 
-#include "builder/split.hpp"
+#include "builder/columns.hpp"
+#include "builder/polish.hpp"
+#include "builder/start.hpp"
 
 #include <prolate/build.hpp>
 
@@ -10,33 +16,51 @@
 
 namespace prolate {
 
-/// A node of the growing tree.
+/// What a quality stands for.
+struct Effort {
+    uint32_t resolution; ///< voxels along the longest side, at least
+    int starts;          ///< tried for each set; the best one goes on
+    int iterations;      ///< of the descent from each start
+    int cycles;          ///< shorter descents afterwards, each from the best state so far, that relocate again
+    int sweeps;          ///< of the polish
+};
+Effort effort_of(Quality quality);
+
+/// A node of the tree.
 struct GrownNode {
-    Cluster cluster;
+    Fit fit;
+    std::vector<uint32_t> pieces; ///< its sub-volume
     uint32_t level = 0;
     uint32_t parent = 0;                       ///< of the root: itself
     uint32_t first_child = 0, child_count = 0; ///< indices into the same array
-    double outside = 0;                        ///< E_vol, cubic metres
-    double surface_error = 0;                  ///< E_sur, metres
 };
 
 struct GrowOptions {
     BuildOptions build;
-    SplitOptions split;
-    /// Volume of (union of these leaves \ solid) / volume of the solid; called for a tolerance only.
-    std::function<double(const std::vector<Fit>&)> outside_ratio;
-    /// Called after each finished split with the share of the work done and the number of nodes; false cancels.
-    std::function<bool(double, uint32_t)> progress;
+    Effort effort;
+    double min_radius; ///< metres
+    const std::atomic<bool>* cancelled;
+    /// Called now and then with the share of the work done and the number of nodes; may set `cancelled`.
+    std::function<void(double, uint32_t)> progress;
 };
 
 struct Grown {
     std::vector<GrownNode> nodes; ///< the root first; children of a node are consecutive
-    bool goal_reached = true;     ///< false: no leaf could be split further before the goal was met
-    std::vector<double> seconds;  ///< wall time by level of the children made
+    bool goal_reached = true;     ///< false: more ellipsoids made nothing better before the goal was met
+    std::vector<double> seconds;  ///< wall time by level
 };
 
-/// Grows the tree over all cells of `voxels`. Splits of one round run in parallel, each with its own random numbers, so
-/// the result does not depend on the number of threads. After a cancellation the result is incomplete.
-Grown grow(const Voxels& voxels, const GrowOptions& options);
+/// Everything about the solid that growing needs.
+struct Solid {
+    Pieces& pieces;      ///< refined along the way
+    const Voxels& cells; ///< coarser: to start from
+    const DistanceField& field;
+    const Columns& columns; ///< to compare covers
+    /// E_vol of an ellipsoid and its gradient, in closed form; empty for the voxel method.
+    std::function<EllipsoidVolume(const Fit&)> outside;
+};
+
+/// The same for any number of threads. After a cancellation the result is incomplete.
+Grown grow(const Solid& solid, const GrowOptions& options);
 
 } // namespace prolate

@@ -10,12 +10,16 @@
 // cover that is promised for it, is the text's mesh to that precision. Skinning and morphing are not applied.
 #include "builder/import_checks.hpp"
 
+#include "src/bytes.hpp"
+#include "src/hash.hpp"
+
 #include <prolate/mesh.hpp>
 
 #include <assimp/Importer.hpp>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <assimp/version.h>
 
 #include <cerrno>
 #include <cmath>
@@ -23,8 +27,10 @@
 #include <limits>
 #include <memory>
 #include <new>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -205,7 +211,32 @@ Result<Mesh> load_or_throw(const char* path, std::string& detail) {
     return mesh;
 }
 
+// The JSON of a glTF or GLB file. (GLB: a header of 12 bytes, then chunks of length, type, content; JSON is the first.)
+std::string_view gltf_json(std::string_view type, std::string_view bytes) {
+    if (type == ".gltf") return bytes;
+    if (bytes.size() < 20) return {};
+    const auto length = load_le<uint32_t>(std::as_bytes(std::span(bytes)).data() + 12);
+    return bytes.substr(20, length);
+}
+
 } // namespace
+
+std::optional<uint64_t> hash_mesh_file(const char* path) try {
+    const std::string type = extension(path);
+    const auto bytes = read_all(path);
+    if (!bytes) return {};
+    if (type == ".gltf" || type == ".glb") {
+        // Buffers in other files are named by a "uri", which only an escape could hide. Images have one, too: then the
+        // answer is needlessly empty, but never wrong. No other format reads triangles from a second file.
+        const std::string_view json = gltf_json(type, *bytes);
+        if (json.empty() || json.find("uri") != json.npos || json.find('\\') != json.npos) return {};
+    }
+    const unsigned version[] = {aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch()};
+    const uint64_t reader = hash_bytes(std::as_bytes(std::span(type)), hash_bytes(std::as_bytes(std::span(version))));
+    return hash_bytes(std::as_bytes(std::span(*bytes)), reader);
+} catch (const std::bad_alloc&) {
+    return {};
+}
 
 Result<Mesh> load_mesh(const char* path, std::string* detail) {
     std::string unused;

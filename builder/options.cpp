@@ -1,5 +1,6 @@
 // Checking and hashing of BuildOptions.
 #include <prolate/build.hpp>
+#include <prolate/version.hpp>
 
 #include "src/bytes.hpp"
 #include "src/hash.hpp"
@@ -20,23 +21,27 @@ Result<void> validate(const BuildOptions& o) {
     if (!std::isfinite(o.alpha) || o.alpha < 0) return bad("alpha must be 0 or above", 0);
     if (!std::isfinite(o.beta) || o.beta < 0) return bad("beta must be 0 or above", 0);
     if (o.alpha + o.beta <= 0) return bad("alpha and beta must not both be 0", 0);
+    if (o.exact && (o.levels > 0 || o.ellipsoids > 0 || o.tolerance != 0))
+        return bad("an exact tree goes down to its triangles: give no levels, ellipsoids or tolerance", 0);
+    if (o.exact && o.primitive != Primitive::ellipsoid)
+        return bad("an exact tree is made of ellipsoids", static_cast<uint64_t>(o.primitive));
+    if (o.leaf_triangles < 1 || o.leaf_triangles > kMaxLeafTriangles)
+        return bad("triangles in a leaf must be 1 to 127", o.leaf_triangles);
     if (o.threads > 1024) return bad("threads must be 0 (all cores) to 1024", o.threads);
-    if (o.method != Method::voxel)
-        return Error{ErrorCode::unsupported, "the analytic method is not in this version; use voxel", 0};
-    if (o.primitive != Primitive::ellipsoid)
-        return Error{ErrorCode::unsupported, "sphere trees are not in this version; use ellipsoid", 0};
     return {};
 }
 
 uint64_t hash(const BuildOptions& o) {
-    std::array<std::byte, 40> bytes{};
+    std::array<std::byte, 48> bytes{};
     std::byte* to = bytes.data();
     const auto put = [&to](auto value) {
         store_le(to, value);
         to += sizeof value;
     };
+    put(kBuilderVersion), put(uint32_t{kFormatVersion});
     put(o.degree), put(o.levels), put(o.ellipsoids), put(o.tolerance), put(o.alpha), put(o.beta), put(o.seed);
     put(static_cast<uint8_t>(o.method)), put(static_cast<uint8_t>(o.primitive)), put(static_cast<uint8_t>(o.quality));
+    put(static_cast<uint8_t>(o.exact ? o.leaf_triangles : 0));
     return hash_bytes(bytes);
 }
 

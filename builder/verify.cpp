@@ -10,10 +10,13 @@
 // of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
 //
 // Shares no data with the bake: other boxes, other inside test (dipole tree instead of columns).
+//
+// An exact tree says which triangles each node stands for, and verify_exact.cpp takes it by its word.
 #include <prolate/verify.hpp>
 
 #include "builder/clip.hpp"
 #include "builder/fit.hpp"
+#include "builder/verify_exact.hpp"
 #include "builder/winding.hpp"
 
 #include <tbb/parallel_for.h>
@@ -261,6 +264,10 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
 
     VerifyReport report;
     report.surface_mode = !cleaned->report.closed;
+    if (tree.has_triangles()) {
+        verify_exact(tree, solid, report);
+        return report;
+    }
     Box box;
     for (const Vec3& v : solid.vertices) box.add(to_vec(v));
     const double size = box.size().norm();
@@ -269,7 +276,7 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
     box.low -= 0.0137 * Vec::Constant(size);
     box.high += 0.0171 * Vec::Constant(size);
     std::optional<Winding> winding;
-    if (!report.surface_mode) winding.emplace(solid);
+    if (!report.surface_mode && !tree.bake_info().exact) winding.emplace(solid);
 
     std::atomic<bool> stop = false;
     tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);

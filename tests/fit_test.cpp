@@ -2,7 +2,6 @@
 #include "builder/cover.hpp"
 #include "builder/fit.hpp"
 #include "builder/random.hpp"
-#include "builder/split.hpp"
 #include "tests/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -11,6 +10,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace prolate {
 namespace {
@@ -44,6 +44,17 @@ TEST(Fit, KnowsMinimumVolumeEllipsoidsOfRegularBodies) {
     }
 }
 
+// Two triangles of the horse: all directions that the fit starts from find the same two corners.
+TEST(Fit, StartsFromAFlatTetrahedron) {
+    const std::vector<Vec> points{{0.034200001507997513, 0.02105649933218956, 0.0018389998003840446},
+                                  {0.034504000097513199, 0.022013500332832336, 0.0025400000158697367},
+                                  {0.034517001360654831, 0.022009499371051788, 0.0018349997699260712},
+                                  {0.034772001206874847, 0.022973500192165375, 0.0025349999777972698}};
+    const Fit fit = enclosing_ellipsoid(points, 1e-6);
+    EXPECT_LE(fit.reach(points), 1 + 1e-9);
+    EXPECT_LE(fit.half_extents().maxCoeff(), 1.1e-3);
+}
+
 TEST(Fit, EnclosesWhateverItIsGiven) {
     Random random(11);
     for (int round = 0; round < 2000; ++round) {
@@ -69,6 +80,28 @@ TEST(Fit, EnclosesWhateverItIsGiven) {
     }
 }
 
+TEST(Capped, KeepsToTheCapsAndWithinCapsSaysSo) {
+    Random random(13);
+    int changed = 0;
+    for (int round = 0; round < 2000; ++round) {
+        const Vec axis = random_vec(random).normalized();
+        const double unit = std::pow(10.0, 12 * random.uniform() - 6), flat = std::pow(10.0, -8 * random.uniform());
+        const Mat q = unit * unit * (Mat::Identity() - (1 - flat) * axis * axis.transpose());
+        const Fit raw(Vec::Zero(), cholesky(q)), fit = capped(Vec::Zero(), q, 1e-2 * unit);
+        EXPECT_TRUE(within_caps(fit, 1e-2 * unit));
+        const bool legal = flat * kMaxAxisRatio * kMaxAxisRatio >= 1;
+        EXPECT_EQ(within_caps(raw, 1e-2 * unit), legal);
+        if (legal) {
+            EXPECT_EQ(fit.factor, raw.factor);
+        }
+        changed += !legal;
+    }
+    EXPECT_GT(changed, 500);
+    EXPECT_LT(changed, 1500);
+    EXPECT_FALSE(within_caps(Fit(), 1.001));
+    EXPECT_TRUE(within_caps(capped(Vec::Zero(), Mat::Identity(), 3), 3));
+}
+
 TEST(Sketch, MergesLikeTheUnion) {
     Random random(3);
     std::vector<Vec> a, b, both;
@@ -86,22 +119,22 @@ TEST(Sketch, MergesLikeTheUnion) {
 TEST(Cover, DecodedNodesCoverWithLittleWaste) {
     const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
     const Winding winding(mesh.view());
-    const Voxels voxels(mesh.view(), true, winding, 24);
+    const Pieces pieces(mesh.view(), true, winding, 24);
     const double low[3] = {-1.5, -1.5, -0.5}, high[3] = {1.5, 1.5, 0.5};
     const format::Lattice lattice = format::lattice_for(low, high);
     Random random(5);
     for (int round = 0; round < 200; ++round) {
-        std::vector<uint32_t> cells;
-        const auto first = static_cast<uint32_t>(random.uniform() * (voxels.cell_count() - 40));
-        for (uint32_t c = 0; c < 1 + random.bits() % 40; ++c) cells.push_back(first + c);
-        const Fit fit = fit_cells(voxels, cells, 1e-5);
+        std::vector<uint32_t> members;
+        const auto first = static_cast<uint32_t>(random.uniform() * (pieces.size() - 40));
+        for (uint32_t c = 0; c < 1 + random.bits() % 40; ++c) members.push_back(first + c);
+        const Fit fit = fit_pieces(pieces, members, 1e-5);
         // Also from a fit that is far too small: cover must not depend on the fit.
         for (const double scale : {1.0, 0.2}) {
-            const auto node = covering_node(fit.scaled(scale), voxels, cells, lattice);
+            const auto node = covering_node(fit.scaled(scale), pieces, members, lattice);
             ASSERT_TRUE(node);
             const Fit decoded(format::decode(*node, lattice));
             double reach = 0;
-            for (const uint32_t cell : cells) reach = std::max(reach, decoded.reach(voxels.points(cell)));
+            for (const uint32_t piece : members) reach = std::max(reach, decoded.reach(pieces.points(piece)));
             EXPECT_LE(reach, 1 - kSlack);
             EXPECT_GE(reach, 1 - 2e-3);
             if (scale == 1.0) {
@@ -109,6 +142,23 @@ TEST(Cover, DecodedNodesCoverWithLittleWaste) {
             }
         }
     }
+}
+
+TEST(SurfaceError, IsTheLargestRadialDistance) {
+    const Mesh cube = shapes::moved(shapes::box(2, 2, 2), {-1, -1, -1});
+    const Pieces pieces(cube.view(), true, Winding(cube.view()), 16);
+    std::vector<uint32_t> all(pieces.size());
+    std::iota(all.begin(), all.end(), 0u);
+    const auto of_ball = [&](double radius) {
+        return surface_error(Fit(Vec::Zero(), radius * Mat::Identity()), pieces, all);
+    };
+    const double corner = std::sqrt(3.0);
+    EXPECT_NEAR(of_ball(0.5), corner - 0.5, 1e-12); // inside: the corners are farthest away
+    EXPECT_NEAR(of_ball(3), 3 - 1, 0.01);           // around: the middles of the sides, by the corner next to them
+    EXPECT_NEAR(of_ball(corner), corner - 1, 0.01);
+    // Half as large along x: the same picture, squeezed. A corner is 1 / |(2, 1, 1)| of its way out on the border.
+    const Fit flat(Vec::Zero(), Vec(0.5, 1, 1).asDiagonal().toDenseMatrix());
+    EXPECT_NEAR(surface_error(flat, pieces, all), corner * (1 - 1 / std::sqrt(6.0)), 1e-12);
 }
 
 } // namespace

@@ -6,6 +6,8 @@
 //  2. projected(): maps A to the unit ball and projects its center onto the image of B (Jacobi eigenvectors, secular
 //     equation, bisection). Below 1 they overlap. It loses digits for two thin crossed needles, method 1 does not.
 //
+// And about two triangles: distance(), by their features.
+//
 // Floats are exact input; poses are composed in long double.
 #pragma once
 
@@ -159,6 +161,80 @@ inline Real projected(const Pair& pair) {
         sum += gap * gap;
     }
     return std::sqrt(sum);
+}
+
+using Corners = std::array<Vector, 3>; // of a triangle
+
+inline Vector cross(const Vector& a, const Vector& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// Distance of two triangles, 0 if they meet: the least over vertices and faces, edges and edges, unless an edge of one
+/// pierces the other.
+inline Real distance(const Corners& a, const Corners& b) {
+    Real least = HUGE_VALL;
+    const auto consider = [&](const Vector& d) { least = std::min(least, std::sqrt(dot(d, d))); };
+    const auto along = [](const Vector& p, Real t, const Vector& d) {
+        return Vector{p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]};
+    };
+    const auto point_to_segment = [&](const Vector& p, const Vector& q, const Vector& r) {
+        const Vector e = r - q;
+        const Real square = dot(e, e);
+        const Real t = square > 0 ? std::clamp(dot(p - q, e) / square, Real{0}, Real{1}) : 0;
+        consider(p - along(q, t, e));
+    };
+    const auto one_way = [&](const Corners& x, const Corners& y) { // corners and edges of x, face of y
+        const Vector n = cross(y[1] - y[0], y[2] - y[0]);
+        const Real square = dot(n, n);
+        const auto side = [&](size_t edge, const Vector& p) {
+            return dot(n, cross(y[(edge + 1) % 3] - y[edge], p - y[edge]));
+        };
+        for (size_t i = 0; i < 3; ++i) {
+            for (size_t j = 0; j < 3; ++j) point_to_segment(x[i], y[j], y[(j + 1) % 3]);
+            if (!(square > 0)) continue;
+            const Real height = dot(n, x[i] - y[0]), next = dot(n, x[(i + 1) % 3] - y[0]);
+            const auto over_face = [&](const Vector& p) {
+                return side(0, p) >= 0 && side(1, p) >= 0 && side(2, p) >= 0;
+            };
+            if (over_face(x[i])) least = std::min(least, std::abs(height) / std::sqrt(square));
+            if (height * next <= 0 && height != next &&
+                over_face(along(x[i], height / (height - next), x[(i + 1) % 3] - x[i])))
+                least = 0;
+        }
+    };
+    one_way(a, b), one_way(b, a);
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t j = 0; j < 3; ++j) { // where both closest points are within the edges
+            const Vector d = a[(i + 1) % 3] - a[i], e = b[(j + 1) % 3] - b[j], r = a[i] - b[j];
+            const Real dd = dot(d, d), ee = dot(e, e), de = dot(d, e), determinant = dd * ee - de * de;
+            if (!(determinant > 0)) continue;
+            const Real s = (de * dot(e, r) - dot(d, r) * ee) / determinant,
+                       t = (dd * dot(e, r) - de * dot(d, r)) / determinant;
+            if (s >= 0 && s <= 1 && t >= 0 && t <= 1) consider(along(a[i], s, d) - along(b[j], t, e));
+        }
+    return least;
+}
+
+/// Corners of a triangle of a body at `pose`, in world orientation, relative to `origin`.
+inline Corners placed(const std::array<Vec3, 3>& triangle, const Pose& pose, const Vec3& origin) {
+    const Matrix r = rotation(pose.rotation);
+    const Vector t{Real{pose.translation.x} - origin.x, Real{pose.translation.y} - origin.y,
+                   Real{pose.translation.z} - origin.z};
+    Corners out;
+    for (size_t i = 0; i < 3; ++i) {
+        const Vector p = r * Vector{triangle[i].x, triangle[i].y, triangle[i].z};
+        out[i] = {p[0] + t[0], p[1] + t[1], p[2] + t[2]};
+    }
+    return out;
+}
+
+/// Least radial coordinate |L^-1 (p - c)| of an ellipsoid at `pose` over a triangle placed as above: below 1 they meet.
+inline Real radius(const Corners& triangle, const Ellipsoid& e, const Pose& pose, const Vec3& origin) {
+    const Pair frame({}, {origin, {}}, e, pose);
+    const Matrix to_ball = inverse(frame.l2);
+    Corners y;
+    for (size_t i = 0; i < 3; ++i) y[i] = to_ball * (triangle[i] - frame.r);
+    return distance(y, Corners{}); // from a triangle that is one point
 }
 
 } // namespace prolate::reference

@@ -123,6 +123,27 @@ inline Mesh sheet(float x, float y, uint32_t n) {
     return mesh;
 }
 
+/// Two balls apart: closed, two components.
+inline Mesh two_pieces() {
+    Mesh mesh = icosphere(2);
+    append(mesh, moved(icosphere(2), {5, 0, 0}, 0.5f));
+    return mesh;
+}
+
+/// A shell: the unit ball less one of radius 0.8.
+inline Mesh hollow_ball() {
+    Mesh mesh = icosphere(3);
+    append(mesh, inverted(moved(icosphere(3), {}, 0.8f)));
+    return mesh;
+}
+
+/// The unit box without its last face.
+inline Mesh open_box() {
+    Mesh mesh = box();
+    mesh.triangles.resize(10);
+    return mesh;
+}
+
 /// Volume enclosed by a closed mesh (divergence theorem).
 inline double enclosed_volume(const Mesh& mesh) {
     double six = 0;

@@ -1,7 +1,6 @@
 // Winding numbers, clipping, columns and voxels against exact geometry.
 #include "builder/clip.hpp"
 #include "builder/columns.hpp"
-#include "builder/outside_volume.hpp"
 #include "builder/random.hpp"
 #include "builder/voxels.hpp"
 #include "tests/shapes.hpp"
@@ -10,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include <algorithm>
 #include <numbers>
 
 namespace prolate {
@@ -93,40 +93,6 @@ TEST(Clip, APolygonInThePlaneGoesToBothSides) {
     EXPECT_EQ(above, flat);
 }
 
-TEST(Columns, MeasureVolumesOfClosedMeshes) {
-    for (const Mesh& mesh : {shapes::icosphere(3), shapes::torus(1, 0.3f, 40, 20), shapes::tetrahedron(),
-                             shapes::inverted(shapes::icosphere(3))}) {
-        const Winding winding(mesh.view());
-        const Columns columns(mesh.view(), true, winding, {-1.5023, -1.5017, 0.005, 0.005, 602, 602});
-        const double exact = std::abs(shapes::enclosed_volume(mesh));
-        EXPECT_NEAR(columns.volume(), exact, 4e-3 * exact);
-    }
-}
-
-TEST(Columns, AreRightThroughEdgesAndVertices) {
-    // A lattice exactly on the corners and edges of a box: each column must still see it once or not at all.
-    const Mesh box = shapes::box(1, 1, 1);
-    const Columns columns(box.view(), true, Winding(box.view()), {0, 0, 0.25, 0.25, 5, 5});
-    for (int i = 0; i < 5; ++i)
-        for (int j = 0; j < 5; ++j)
-            for (const Interval& solid : columns.column(i, j)) {
-                EXPECT_EQ(solid.low, 0);
-                EXPECT_EQ(solid.high, 1);
-            }
-    EXPECT_EQ(columns.volume(), 1.0); // 16 of 25: the symbolic step takes one border of two
-}
-
-TEST(Columns, MeasureAUnionAgainstTheSolid) {
-    // Two overlapping balls of radius 1, their centers 1 apart, around a cube of side 1/2 inside both.
-    const Mesh cube = shapes::moved(shapes::box(0.5f, 0.5f, 0.5f), {0.25f, -0.25f, -0.25f});
-    const std::vector<Ellipsoid> balls{{}, {.center = {1, 0, 0}}};
-    const CoverVolume volume = measure_cover(cube.view(), true, Winding(cube.view()), balls, 800);
-    const double ball = 4.0 / 3.0 * std::numbers::pi, lens = std::numbers::pi / 12 * (4 + 1) * (2 - 1) * (2 - 1);
-    EXPECT_NEAR(volume.whole, 2 * ball - lens, 2e-3);
-    EXPECT_NEAR(volume.solid, 0.125, 1e-3);
-    EXPECT_NEAR(volume.outside, 2 * ball - lens - 0.125, 3e-3);
-}
-
 // Random points of the solid lie in the hull of their cell's points: tested with ellipsoids, which is what they are
 // for.
 TEST(Voxels, AnEllipsoidAroundThePointsCoversThePiece) {
@@ -154,45 +120,65 @@ TEST(Voxels, AnEllipsoidAroundThePointsCoversThePiece) {
     EXPECT_GT(tested, 2000);
 }
 
-TEST(Voxels, FractionsAndSamplesAddUp) {
-    const Mesh mesh = shapes::torus(1, 0.3f, 64, 32);
-    Voxels voxels(mesh.view(), true, Winding(mesh.view()), 40);
-    voxels.sample_surface(mesh.view(), 5000, 1);
-    const double exact = shapes::enclosed_volume(mesh);
-    EXPECT_NEAR(voxels.solid_volume(), exact, 2e-3 * exact);
-    double sum = 0;
-    const auto& n = voxels.size();
-    for (size_t v = 0; v < voxels.index(n[0] - 1, n[1] - 1, n[2] - 1) + 1; ++v) sum += voxels.solid_fraction(v);
-    EXPECT_NEAR(sum * std::pow(voxels.pitch(), 3), exact, 2e-3 * exact);
-    size_t samples = 0;
-    for (uint32_t c = 0; c < voxels.cell_count(); ++c) {
-        samples += voxels.samples(c).size();
-        for (const Vec& p : voxels.samples(c)) EXPECT_NEAR(std::hypot(std::hypot(p.x(), p.y()) - 1, p.z()), 0.3, 0.01);
+TEST(Voxels, KnowTheTrianglesInACell) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 30, 12);
+    const Winding winding(mesh.view());
+    const Voxels voxels(mesh.view(), true, winding, 24);
+    // A point of a triangle lies in the box of its cell's points, and the cell knows the triangle.
+    Random random(3);
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+        for (int i = 0; i < 10; ++i) {
+            const double u = random.uniform(), v = (1 - u) * random.uniform();
+            const Vec a = to_vec(mesh.vertices[mesh.triangles[t][0]]);
+            const Vec p = a + u * (to_vec(mesh.vertices[mesh.triangles[t][1]]) - a) +
+                          v * (to_vec(mesh.vertices[mesh.triangles[t][2]]) - a);
+            const uint32_t cell = voxels.cell_at(p);
+            ASSERT_NE(cell, Voxels::kNoCell);
+            EXPECT_TRUE(std::ranges::count(voxels.triangles(cell), t) == 1);
+            const Box box = voxels.box(cell);
+            EXPECT_TRUE((p - box.low).minCoeff() >= -1e-12 && (box.high - p).minCoeff() >= -1e-12);
+        }
+    // Without triangles a cell is solid throughout, and its points are its corners.
+    int inner = 0;
+    for (uint32_t cell = 0; cell < voxels.cell_count(); ++cell) {
+        const auto& [i, j, k] = voxels.coordinates(cell);
+        EXPECT_EQ(voxels.cell_at(i, j, k), cell);
+        if (!voxels.triangles(cell).empty()) continue;
+        ++inner;
+        EXPECT_EQ(voxels.points(cell).size(), 8u);
+        EXPECT_GT(winding(voxels.box(cell).center()), 0.9);
     }
-    EXPECT_NEAR(double(samples), 5000, 5);
+    EXPECT_GT(inner, 100);
+    EXPECT_EQ(voxels.cell_at(Vec(0, 0, 0)), Voxels::kNoCell); // the hole
+    EXPECT_EQ(voxels.cell_at(Vec(1e30, 0, 0)), Voxels::kNoCell);
+    EXPECT_EQ(voxels.cell_at(Vec(-1e30, NAN, 0)), Voxels::kNoCell);
+    EXPECT_EQ(voxels.cell_at(-1, 0, 0), Voxels::kNoCell);
 }
 
-TEST(OutsideVolume, OfEllipsoidsAroundABall) {
-    const Mesh ball = shapes::icosphere(4);
-    const Voxels voxels(ball.view(), true, Winding(ball.view()), 64);
-    const double inner = shapes::enclosed_volume(ball);
-    for (const double stretch : {1.01, 1.5, 3.0}) {
-        const Fit fit(Vec::Zero(), Vec(stretch, 1.01, 1.2).asDiagonal().toDenseMatrix());
-        const double exact = fit.volume() - inner;
-        EXPECT_NEAR(outside_volume(fit, voxels), exact, 0.01 * fit.volume()) << stretch;
+TEST(Voxels, OfARegionAreThoseThatMeetIt) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 30, 12);
+    const Voxels voxels(mesh.view(), true, Winding(mesh.view()), 20);
+    Random random(4);
+    size_t met = 0;
+    for (int round = 0; round < 200; ++round) {
+        Box region;
+        for (int i = 0; i < 2; ++i) {
+            const double x = random.symmetric(), y = random.symmetric(), z = random.symmetric();
+            region.add(1.6 * Vec(x, y, z));
+        }
+        std::vector<uint32_t> expected, seen;
+        for (uint32_t cell = 0; cell < voxels.cell_count(); ++cell) {
+            const auto& [i, j, k] = voxels.coordinates(cell);
+            const Vec low = voxels.origin() + voxels.pitch() * Vec(i, j, k);
+            const Vec high = low + Vec::Constant(voxels.pitch());
+            if ((low.array() <= region.high.array()).all() && (high.array() >= region.low.array()).all())
+                expected.push_back(cell);
+        }
+        voxels.for_each_in(region, [&](uint32_t cell) { seen.push_back(cell); });
+        EXPECT_EQ(seen, expected);
+        met += seen.size();
     }
-    // Wholly inside the solid: nothing outside. Small and beyond the grid: all of it.
-    EXPECT_NEAR(outside_volume(Fit(Vec(0.1, 0, 0), 0.4 * Mat::Identity()), voxels), 0, 1e-4);
-    const Fit far(Vec(3, 3, 3), 0.02 * Mat::Identity());
-    EXPECT_NEAR(outside_volume(far, voxels), far.volume(), 0.02 * far.volume());
-}
-
-TEST(SurfaceError, IsTheRadialDistance) {
-    const Fit fit(Vec(1, 2, 3), Vec(2, 1, 0.5).asDiagonal().toDenseMatrix());
-    EXPECT_NEAR(radial_distance(fit, Vec(1 + 1, 2, 3)), 1, 1e-12); // half way out along the long axis
-    EXPECT_NEAR(radial_distance(fit, Vec(1, 2, 3 + 0.4)), 0.1, 1e-12);
-    EXPECT_NEAR(radial_distance(fit, Vec(1, 4, 3)), 1, 1e-12); // outside
-    EXPECT_GE(radial_distance(fit, Vec(1, 2, 3)), 2);          // at the center: the longest radius at least
+    EXPECT_GT(met, 10'000u);
 }
 
 } // namespace

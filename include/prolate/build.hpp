@@ -11,25 +11,33 @@
 namespace prolate {
 
 /// Options of build(). The defaults are a sound choice. Exactly one of levels, ellipsoids, tolerance may be non-zero;
-/// if none is, levels = 3.
+/// if none is, levels = 3. An exact tree goes down to its triangles instead: it takes none of the three, and of the
+/// rest only degree, leaf_triangles and threads change it.
 struct BuildOptions {
     uint32_t degree = 8;     ///< children per node, 2 ... kMaxDegree
     uint32_t levels = 0;     ///< levels below the root, 1 ... kMaxLevels - 1
-    uint32_t ellipsoids = 0; ///< leaves, 1 ... 65536: the worst node is split next until there are exactly so many
-    float tolerance = 0;     ///< outside ratio of the leaves, above 0: the worst node is split next until it is met
-    Method method = Method::voxel;              ///< only voxel in this version
-    Primitive primitive = Primitive::ellipsoid; ///< only ellipsoid in this version
-    Quality quality = Quality::normal;          ///< voxel resolution and number of optimisation sweeps
+    uint32_t ellipsoids = 0; ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
+    float tolerance = 0;     ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
+    Method method = Method::voxel;              ///< how E_vol is evaluated; analytic needs a closed mesh
+    Primitive primitive = Primitive::ellipsoid; ///< what the nodes are
+    Quality quality = Quality::normal;          ///< voxel resolution and effort of the optimisation
     float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
     float beta = 0.5f;                          ///< weight of E_vol, >= 0; alpha + beta > 0
-    uint64_t seed = 1;                          ///< of the surface sampling
+    uint64_t seed = 1;                          ///< of all that is drawn at random
+    bool exact = false;                         ///< make an exact tree (tree.hpp)
+    uint32_t leaf_triangles = 4;                ///< triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
     uint32_t threads = 0;                       ///< 0 = all cores. The bytes do not depend on it.
 };
 
 /// Checks ranges. Fails with bad_options or unsupported.
 Result<void> validate(const BuildOptions& options);
 
-/// Hash of all that changes the bytes (not `threads`); a bake cache's key together with the mesh.
+/// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
+/// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
+inline constexpr uint32_t kBuilderVersion = 3;
+
+/// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
+/// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
 uint64_t hash(const BuildOptions& options);
 
 /// Stage of a running build, for a progress display.
@@ -43,15 +51,11 @@ struct BuildProgress {
 using ProgressCallback = std::function<bool(const BuildProgress&)>;
 
 /// Figures of one level's cut.
-struct LevelReport {
-    uint32_t nodes = 0;           ///< ellipsoids of the cut
-    uint64_t bytes = 0;           ///< file size up to here
-    double outside_ratio = 0;     ///< vol(union \ solid) / vol(solid), by columns; NaN if the solid has no volume
-    double union_volume = 0;      ///< cubic metres
-    double sum_outside_ratio = 0; ///< sum of the single ellipsoids' outside volumes / vol(solid), by voxels
-    double surface_error = 0;     ///< largest E_sur, metres
-    bool covered = false;         ///< proved by verify()
-    double seconds = 0;           ///< wall time spent on this level, proof included
+struct LevelReport : LevelFigures {
+    uint32_t nodes = 0;   ///< ellipsoids of the cut
+    uint64_t bytes = 0;   ///< file size up to here
+    bool covered = false; ///< proved by verify()
+    double seconds = 0;   ///< wall time spent on this level, proof included
 };
 
 /// What build() made, and what it saw.
@@ -59,9 +63,10 @@ struct Build {
     Tree tree;
     MeshReport mesh;
     std::vector<LevelReport> levels;
-    double solid_volume = 0; ///< cubic metres
-    double diagonal = 0;     ///< of the mesh's bounding box, metres
-    uint32_t resolution = 0; ///< voxels along the longest side
+    double solid_volume = 0;       ///< cubic metres
+    double solid_volume_error = 0; ///< cubic metres; found as LevelFigures::outside_ratio_error is
+    double diagonal = 0;           ///< of the mesh's bounding box, metres
+    uint32_t resolution = 0;       ///< voxels along the longest side
     bool surface_mode = false;
     bool goal_reached = true; ///< false: the asked tolerance or count could not be met at this resolution
     double seconds = 0;

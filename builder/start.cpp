@@ -1,13 +1,10 @@
-// Greedy merging of connected blocks of cells (paper, Algorithm 1, step 6, the "Ellipsoids Merge Algorithm" of its
-// reference [16], whose text gives no details; m, the cost and the neighbourhood below are ours).
-//
-// Start: the connected parts of the sub-volume in each block of b x b x b cells, b as small as keeps m below
-// pieces_per_child * k. Merging: always the pair of touching pieces whose union adds least error. A piece keeps a
-// support sketch, so that an ellipsoid around a union costs the same whatever its size. When no two touching pieces are
-// left (several components), any two pieces may merge.
-#include "builder/split.hpp"
+#include "builder/start.hpp"
+
+#include "builder/descent.hpp"
+#include "builder/random.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -17,14 +14,15 @@
 namespace prolate {
 namespace {
 
-constexpr size_t kSamplesPerPiece = 64; // for E_sur while merging
-constexpr double kFitTolerance = 2e-2;  // merging ranks pairs; the result is refitted
-constexpr size_t kAllPairsLimit = 400;  // pieces up to which components may pair up freely
+constexpr double kFitTolerance = 2e-2; // merging ranks pairs; the result is refitted
+constexpr size_t kAllPairsLimit = 400; // pieces up to which components may pair up freely
+constexpr int kVolumeSamples = 192;    // of an ellipsoid, for its outside volume
+constexpr int kLloydRounds = 8;
+constexpr uint32_t kDirectLimit = 64;  // clusters found at once; for more, the cells are halved first
 
 struct Piece {
     std::vector<uint32_t> cells;
     Sketch sketch;
-    std::vector<Vec> samples;
     std::set<uint32_t> neighbours;
     double error = 0;
     bool alive = true;
@@ -40,23 +38,22 @@ uint32_t find_root(std::vector<uint32_t>& parent, uint32_t i) {
 class Neighbourhood {
 public:
     Neighbourhood(const Voxels& voxels, std::span<const uint32_t> cells)
-        : voxels_(voxels), cells_(cells), position_(voxels.cell_count(), Voxels::kNoCell) {
-        for (uint32_t i = 0; i < cells.size(); ++i) position_[cells[i]] = i;
-    }
+        : voxels_(voxels), cells_(cells) {}
     // Visits the positions in the set of the cells that touch cells[position], by half of the 26 around it: over all
     // positions, each pair once.
     template <class Visit> void later(uint32_t position, Visit&& visit) const {
         const auto& [i, j, k] = voxels_.coordinates(cells_[position]);
         for (int n = 14; n < 27; ++n) {
             const uint32_t cell = voxels_.cell_at(i + n / 9 - 1, j + n / 3 % 3 - 1, k + n % 3 - 1);
-            if (cell != Voxels::kNoCell && position_[cell] != Voxels::kNoCell) visit(position_[cell]);
+            if (cell == Voxels::kNoCell) continue;
+            const auto found = std::lower_bound(cells_.begin(), cells_.end(), cell);
+            if (found != cells_.end() && *found == cell) visit(static_cast<uint32_t>(found - cells_.begin()));
         }
     }
 
 private:
     const Voxels& voxels_;
-    std::span<const uint32_t> cells_;
-    std::vector<uint32_t> position_; // of each cell of the grid in the set
+    std::span<const uint32_t> cells_; // rising
 };
 
 // Connected parts in blocks of b cells: for each cell, the number of its part; returns how many there are.
@@ -89,23 +86,20 @@ uint32_t label_blocks(const Voxels& voxels, std::span<const uint32_t> cells, con
 
 class Merger {
 public:
-    Merger(const Voxels& voxels, const SplitOptions& options) : voxels_(voxels), options_(options) {}
+    Merger(double min_radius, const std::function<double(const Fit&)>& outside)
+        : min_radius_(min_radius), outside_(outside) {}
 
     std::vector<Piece> pieces;
 
-    double error(const Sketch& sketch, std::span<const Vec> a, std::span<const Vec> b) const {
-        const Fit fit = enclosing_ellipsoid(sketch.points(), options_.min_radius, kFitTolerance);
-        double surface = 0;
-        for (const auto& samples : {a, b})
-            for (const Vec& p : samples) surface = std::max(surface, radial_distance(fit, p));
-        return options_.error(surface, outside_volume(fit, voxels_));
+    double error(const Sketch& sketch) const {
+        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_, kFitTolerance));
     }
 
     void offer(uint32_t a, uint32_t b) {
         if (a > b) std::swap(a, b);
         Sketch both = pieces[a].sketch;
         both.add(pieces[b].sketch);
-        const double growth = error(both, pieces[a].samples, pieces[b].samples) - pieces[a].error - pieces[b].error;
+        const double growth = error(both) - pieces[a].error - pieces[b].error;
         queue_.push({growth, a, b, pieces[a].version, pieces[b].version});
     }
 
@@ -118,9 +112,7 @@ public:
             if (!a.alive || !b.alive || a.version != pair.version_a || b.version != pair.version_b) continue;
             a.sketch.add(b.sketch);
             a.cells.insert(a.cells.end(), b.cells.begin(), b.cells.end());
-            a.samples.insert(a.samples.end(), b.samples.begin(), b.samples.end());
-            thin(a.samples);
-            a.error = error(a.sketch, a.samples, {});
+            a.error = error(a.sketch);
             ++a.version;
             b.alive = false;
             for (const uint32_t n : b.neighbours) {
@@ -134,14 +126,6 @@ public:
         return false;
     }
 
-    // Keeps every second sample of too many.
-    static void thin(std::vector<Vec>& samples) {
-        while (samples.size() > 2 * kSamplesPerPiece) {
-            for (size_t i = 0; i < samples.size() / 2; ++i) samples[i] = samples[2 * i];
-            samples.resize(samples.size() / 2);
-        }
-    }
-
 private:
     struct Pair {
         double growth;
@@ -151,17 +135,37 @@ private:
             return std::pair(a, b) > std::pair(other.a, other.b);
         }
     };
-    const Voxels& voxels_;
-    const SplitOptions& options_;
+    const double min_radius_;
+    const std::function<double(const Fit&)>& outside_;
     std::priority_queue<Pair> queue_;
 };
 
+Cluster cluster_of(const Voxels& voxels, std::vector<uint32_t> cells, double min_radius) {
+    Sketch sketch;
+    for (const uint32_t cell : cells) sketch.add(voxels.points(cell));
+    return {enclosing_ellipsoid(sketch.points(), min_radius), std::move(cells)};
+}
+
 } // namespace
 
-std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
-                                  uint32_t pieces_per_child, const SplitOptions& options) {
+double sampled_outside_volume(const Fit& fit, const DistanceField& field) {
+    static const std::vector<Vec> samples = [] { // evenly spread in the unit ball
+        std::vector<Vec> out = even_directions(kVolumeSamples);
+        for (int i = 0; i < kVolumeSamples; ++i) // 119 is prime to 192: the radii are spread over the directions
+            out[static_cast<size_t>(i)] *= std::cbrt((i * 119 % kVolumeSamples + 0.5) / kVolumeSamples);
+        return out;
+    }();
+    double outside = 0;
+    for (const Vec& u : samples)
+        outside += std::clamp(field(fit.center + fit.factor * u) / field.pitch() + 0.5, 0.0, 1.0);
+    return fit.volume() * outside / static_cast<double>(samples.size());
+}
+
+std::vector<Cluster> merge_start(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k,
+                                 uint32_t pieces_per_cluster, double min_radius,
+                                 const std::function<double(const Fit&)>& outside) {
     const Neighbourhood neighbourhood(voxels, cells);
-    const size_t most = size_t{pieces_per_child} * k;
+    const size_t most = size_t{pieces_per_cluster} * k;
     std::vector<uint32_t> label;
     uint32_t count = 0;
     const int longest = *std::max_element(voxels.size().begin(), voxels.size().end());
@@ -183,13 +187,11 @@ std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t
         }
     }
 
-    Merger merger(voxels, options);
+    Merger merger(min_radius, outside);
     merger.pieces.resize(count);
     for (uint32_t p = 0; p < cells.size(); ++p) {
         Piece& piece = merger.pieces[label[p]];
         piece.cells.push_back(cells[p]);
-        const auto samples = voxels.samples(cells[p]);
-        piece.samples.insert(piece.samples.end(), samples.begin(), samples.end());
         neighbourhood.later(p, [&](uint32_t q) {
             if (label[p] == label[q]) return;
             piece.neighbours.insert(label[q]);
@@ -197,9 +199,8 @@ std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t
         });
     }
     for (Piece& piece : merger.pieces) {
-        Merger::thin(piece.samples);
-        for (const uint32_t cell : voxels.hull_cells(piece.cells)) piece.sketch.add(voxels.points(cell));
-        piece.error = merger.error(piece.sketch, piece.samples, {});
+        for (const uint32_t cell : piece.cells) piece.sketch.add(voxels.points(cell));
+        piece.error = merger.error(piece.sketch);
     }
     uint32_t left = count;
     if (left > k)
@@ -228,9 +229,83 @@ std::vector<Cluster> merge_pieces(const Voxels& voxels, std::span<const uint32_t
     for (Piece& piece : merger.pieces) {
         if (!piece.alive) continue;
         std::sort(piece.cells.begin(), piece.cells.end());
-        clusters.push_back({fit_cells(voxels, piece.cells, options.min_radius), std::move(piece.cells)});
+        clusters.push_back(cluster_of(voxels, std::move(piece.cells), min_radius));
     }
     return clusters;
+}
+
+std::vector<Cluster> spread_start(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, uint64_t seed,
+                                  double min_radius) {
+    std::vector<Vec> sites;
+    Box box;
+    for (const uint32_t cell : cells) {
+        sites.push_back(voxels.box(cell).center());
+        box.add(sites.back());
+    }
+    if (k > kDirectLimit) { // halve along the longest side
+        int axis = 0;
+        box.size().maxCoeff(&axis);
+        std::vector<uint32_t> order(cells.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::stable_sort(order.begin(), order.end(),
+                         [&](uint32_t a, uint32_t b) { return sites[a][axis] < sites[b][axis]; });
+        std::vector<uint32_t> half[2];
+        for (size_t i = 0; i < order.size(); ++i)
+            half[i >= order.size() * (k / 2) / k].push_back(cells[order[i]]);
+        std::vector<Cluster> out;
+        for (size_t h = 0; h < 2; ++h) {
+            std::sort(half[h].begin(), half[h].end());
+            const uint32_t count = h == 0 ? k / 2 : k - k / 2;
+            for (Cluster& cluster : spread_start(voxels, half[h], count, seed + h, min_radius))
+                out.push_back(std::move(cluster));
+        }
+        return out;
+    }
+
+    // Each center as far from those before it as can be (Gonzalez 1985), then Lloyd's algorithm.
+    Random random(seed);
+    std::vector<Vec> centers;
+    std::vector<double> distance(sites.size(), HUGE_VAL);
+    auto pick = static_cast<size_t>(random.uniform() * static_cast<double>(sites.size()));
+    while (centers.size() < std::min<size_t>(k, sites.size())) {
+        centers.push_back(sites[pick]);
+        for (size_t i = 0; i < sites.size(); ++i)
+            distance[i] = std::min(distance[i], (sites[i] - centers.back()).squaredNorm());
+        pick = static_cast<size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
+    }
+    std::vector<std::vector<uint32_t>> members(centers.size());
+    for (int round = 0; round < kLloydRounds; ++round) {
+        for (std::vector<uint32_t>& list : members) list.clear();
+        for (size_t i = 0; i < sites.size(); ++i) {
+            size_t nearest = 0;
+            double least = HUGE_VAL;
+            for (size_t c = 0; c < centers.size(); ++c)
+                if (const double d = (sites[i] - centers[c]).squaredNorm(); d < least) least = d, nearest = c;
+            members[nearest].push_back(static_cast<uint32_t>(i));
+        }
+        for (size_t c = 0; c < centers.size(); ++c) {
+            if (members[c].empty()) continue;
+            Vec mean = Vec::Zero();
+            for (const uint32_t i : members[c]) mean += sites[i];
+            centers[c] = mean / static_cast<double>(members[c].size());
+        }
+    }
+    // The ellipsoid with a cluster's mean and covariance, were the cluster an ellipsoid itself, a voxel thicker.
+    std::vector<Cluster> out;
+    const double thickness = voxels.pitch() * voxels.pitch() / 4;
+    for (const std::vector<uint32_t>& list : members) {
+        if (list.empty()) continue;
+        Cluster cluster;
+        Vec mean = Vec::Zero();
+        for (const uint32_t i : list) mean += sites[i], cluster.cells.push_back(cells[i]);
+        mean /= static_cast<double>(list.size());
+        Mat covariance = Mat::Zero();
+        for (const uint32_t i : list) covariance += (sites[i] - mean) * (sites[i] - mean).transpose();
+        covariance *= 5 / static_cast<double>(list.size());
+        cluster.fit = capped(mean, covariance + thickness * Mat::Identity(), min_radius);
+        out.push_back(std::move(cluster));
+    }
+    return out;
 }
 
 } // namespace prolate

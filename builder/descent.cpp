@@ -1,0 +1,375 @@
+#include "builder/descent.hpp"
+
+#include "builder/central.hpp"
+#include "builder/random.hpp"
+#include "src/symmetric3.hpp"
+
+#include <Eigen/Geometry>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace prolate {
+namespace {
+
+constexpr double kLastKappa = 18;
+constexpr double kFirstStep = 0.07, kStepDecay = 0.75; // relative to the radii; falls to 0.4 % of the first
+constexpr double kPull = 20;            // growth of the multipliers, times ellipsoids / points
+constexpr double kEarlyPull = 2, kAccumulateFrom = 0.3; // until then a penalty on the excess alone, with kappa
+constexpr double kMaxExcess = 0.3;     // radial coordinates beyond 1 count no more than this
+constexpr int kNeighbourInterval = 8;  // iterations between two searches for neighbours
+constexpr double kNeighbourMargin = 1.2;
+constexpr size_t kPointStride = 8;     // a covered point is looked at every so many iterations
+constexpr double kRelocateUntil = 0.6; // share of the iterations
+constexpr int kRelocations = 20;       // rounds of relocation, were they made to the end
+constexpr double kUseless = 0.07;      // relocated: what it alone covers is less than this much of what it goes to halve
+
+// Gradient descent with momentum, each ellipsoid's step normalised by the size of its recent gradients (Kingma and Ba
+// 2015, with one common scale for all nine parameters, so that steps do not depend on the choice of axes).
+struct Momentum {
+    std::array<double, 9> mean{};
+    double square = 0;
+};
+
+using Coordinates = std::array<double, 9>; // s, then G: 00, 11, 22, 01, 02, 12
+
+Coordinates coordinates_of(const Vec& s, const Mat& g) {
+    return {s.x(), s.y(), s.z(), g(0, 0), g(1, 1), g(2, 2), g(0, 1), g(0, 2), g(1, 2)};
+}
+
+class Descent {
+public:
+    Descent(EllipsoidSet& set, const DistanceField& field, std::span<const Vec> points, std::vector<uint32_t> owner,
+            const DescentOptions& options)
+        : set_(set), fits_(set.fits), field_(field), points_(points), owner_(std::move(owner)), options_(options),
+          random_(options.seed), directions_(even_directions(options.directions)), rotated_(directions_.size()),
+          multiplier_(points.size(), 0), momentum_(fits_.size()) {}
+
+    void run() {
+        std::vector<Fit> next(fits_.size());
+        for (int iteration = 0; iteration < options_.iterations; ++iteration) {
+            if (options_.cancelled->load(std::memory_order_relaxed)) return;
+            const double t = static_cast<double>(iteration) / std::max(1, options_.iterations - 1);
+            bool look = iteration % kNeighbourInterval == 0;
+            if (options_.relocate && t < kRelocateUntil && iteration > 0 &&
+                iteration % std::max(1, options_.iterations / kRelocations) == 0)
+                look = relocate() || look;
+            if (look) {
+                neighbours_ = neighbours_of(fits_, kNeighbourMargin);
+                find_lost_points();
+            }
+            schedule(t);
+            const Mat rotation = random_rotation(random_);
+            for (size_t d = 0; d < directions_.size(); ++d) rotated_[d] = rotation * directions_[d];
+            update_points(static_cast<size_t>(iteration), t > kAccumulateFrom);
+            tbb::parallel_for(tbb::blocked_range<size_t>(0, fits_.size(), 8), [&](const auto& range) {
+                for (size_t i = range.begin(); i != range.end(); ++i) next[i] = step(i);
+            });
+            fits_.swap(next);
+            decay_mean_ *= kMean, decay_square_ *= kSquare;
+            if (options_.progress && iteration % 16 == 0) options_.progress(t);
+        }
+    }
+
+private:
+    static constexpr double kMean = 0.8, kSquare = 0.95;
+
+    // kappa rises about geometrically and stays at its last value for a fifth of the time; steps fall.
+    void schedule(double t) {
+        const double rising = std::min(1.0, 1.25 * t);
+        double ratio = kLastKappa / options_.first_kappa; // its eighth root:
+        for (int i = 0; i < 3; ++i) ratio = std::sqrt(ratio);
+        double k = 1 + rising * (ratio - 1);
+        for (int i = 0; i < 3; ++i) k *= k;
+        kappa_ = options_.first_kappa * k;
+        const double s = (1 - kStepDecay * t) * (1 - kStepDecay * t);
+        step_ = kFirstStep * s * s * std::min(1.0, 10 / options_.first_kappa);
+    }
+
+    bool in_chain(size_t i, const Vec& p) const {
+        for (const Fit& ancestor : set_.chain(i))
+            if (ancestor.radial_squared(p) > 1) return false;
+        return true;
+    }
+
+    // Weight of the border point x of ellipsoid i; `hint` is the neighbour that hid the last one.
+    double weight(size_t i, const Vec& x, size_t& hint) const {
+        const std::vector<uint32_t>& others = neighbours_[i];
+        bool hidden = false;
+        for (size_t n = 0; n < others.size(); ++n) {
+            const size_t at = n == 0 ? hint : n == hint ? 0 : n; // the hint first
+            const uint32_t other = others[at];
+            if (fits_[other].radial_squared(x) >= 1) continue;
+            hidden = true;
+            if (in_chain(other, x)) {
+                hint = at;
+                return 0;
+            }
+        }
+        const double d = field_(x);
+        if (d > 0) return hidden ? 0 : options_.objective(d);
+        return in_chain(i, x) ? -kappa_ : 0;
+    }
+
+    Fit step(size_t i) {
+        Vec s = Vec::Zero();
+        Mat g = Mat::Zero();
+        size_t hint = 0;
+        const Fit& fit = fits_[i];
+        for (const Vec& u : rotated_) {
+            const double w = weight(i, fit.center + fit.factor * u, hint);
+            if (w == 0) continue;
+            s += w * u;
+            g += w * u * u.transpose();
+        }
+        const double share = 3.0 / static_cast<double>(rotated_.size()); // of the ellipsoid's own volume
+        s = share * s - pull_[i].s;
+        g = share * g - pull_[i].g;
+        if (options_.primitive == Primitive::sphere) g = g.trace() / 3 * Mat::Identity();
+
+        const Coordinates gradient = coordinates_of(s, g);
+        Momentum& m = momentum_[i];
+        double square = 0;
+        for (size_t k = 0; k < 9; ++k) {
+            m.mean[k] = kMean * m.mean[k] + (1 - kMean) * gradient[k];
+            square += gradient[k] * gradient[k] / 9;
+        }
+        m.square = kSquare * m.square + (1 - kSquare) * square;
+        const double by = -step_ / (1 - decay_mean_) / (std::sqrt(m.square / (1 - decay_square_)) + 1e-6);
+        const auto& v = m.mean;
+        Mat change;
+        change << v[3], v[6], v[7], v[6], v[4], v[8], v[7], v[8], v[5];
+        return moved(fit, by * Vec(v[0], v[1], v[2]), by * change, options_.min_radius);
+    }
+
+    // Who covers each point, how hard those that nobody covers pull, and on whom.
+    void update_points(size_t iteration, bool accumulating) {
+        const double rate = (accumulating ? kPull : kEarlyPull * kappa_) * static_cast<double>(fits_.size()) / static_cast<double>(std::max<size_t>(1, points_.size()));
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
+            for (size_t p = range.begin(); p != range.end(); ++p) {
+                if (multiplier_[p] == 0 && (p + iteration) % kPointStride != 0) continue;
+                const double excess = std::min(find_owner(p) - 1, kMaxExcess);
+                const double before = accumulating ? double{multiplier_[p]} : 0;
+                multiplier_[p] = static_cast<float>(std::max(0.0, before + rate * excess));
+            }
+        });
+        pull_.assign(fits_.size(), {Vec::Zero(), Mat::Zero()});
+        for (size_t p = 0; p < points_.size(); ++p) {
+            if (multiplier_[p] == 0) continue;
+            const Fit& fit = fits_[owner_[p]];
+            const Vec y = fit.inverse * (points_[p] - fit.center), outward = y.normalized();
+            pull_[owner_[p]].s += double{multiplier_[p]} * outward;
+            const Mat g = double{multiplier_[p]} * outward * y.transpose();
+            pull_[owner_[p]].g += 0.5 * (g + g.transpose());
+        }
+    }
+
+    // Radial coordinate of the point in its owner. Among the owner and its neighbours, the most central one becomes
+    // the owner; one whose ancestors do not have the point cannot.
+    double find_owner(size_t p) {
+        const Vec& x = points_[p];
+        const uint32_t old = owner_[p];
+        double nearest = fits_[old].radial_squared(x);
+        const bool may_have_it = in_chain(old, x);
+        if (nearest > 1 || !may_have_it) {
+            if (!may_have_it) nearest = HUGE_VAL;
+            for (const uint32_t other : neighbours_[old])
+                if (const double radial = fits_[other].radial_squared(x); radial < nearest && in_chain(other, x))
+                    nearest = radial, owner_[p] = other;
+            if (nearest == HUGE_VAL) nearest = 1; // none that may have it is near: not to be moved by this point
+        }
+        return std::sqrt(nearest);
+    }
+
+    // Points whose owner has moved away for good, or may not have them, look for the most central one of all.
+    void find_lost_points() {
+        constexpr double kLost = 3;
+        const CentralTree tree(fits_);
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
+            for (size_t p = range.begin(); p != range.end(); ++p) {
+                const double radial = fits_[owner_[p]].radial_squared(points_[p]);
+                const bool may_have_it = in_chain(owner_[p], points_[p]);
+                if (radial < kLost * kLost && may_have_it) continue;
+                const auto found = tree.find(points_[p], may_have_it ? radial : HUGE_VAL,
+                                             [&](uint32_t i) { return in_chain(i, points_[p]); });
+                owner_[p] = found.value_or(owner_[p]);
+            }
+        });
+    }
+
+    // Ellipsoids that alone cover little go to halve those that stick out most.
+    bool relocate() {
+        const auto [covers, outside] = exclusive_volumes();
+        std::vector<uint32_t> by_use(fits_.size()), by_need(fits_.size());
+        std::iota(by_use.begin(), by_use.end(), 0u);
+        by_need = by_use;
+        std::stable_sort(by_use.begin(), by_use.end(), [&](uint32_t a, uint32_t b) { return covers[a] < covers[b]; });
+        std::stable_sort(by_need.begin(), by_need.end(), [&](uint32_t a, uint32_t b) { return outside[a] > outside[b]; });
+        std::vector<bool> done(fits_.size(), false);
+        size_t made = 0;
+        const size_t limit = std::max<size_t>(1, fits_.size() / 16);
+        for (const uint32_t from : by_use) {
+            if (made == limit) break;
+            const auto to = std::find_if(by_need.begin(), by_need.end(), [&](uint32_t b) {
+                return !done[b] && b != from && (set_.parent.empty() || set_.parent[b] == set_.parent[from]);
+            });
+            if (to == by_need.end() || done[from]) continue;
+            if (covers[from] > kUseless * outside[*to]) {
+                if (set_.parent.empty()) break;
+                continue;
+            }
+            done[from] = done[*to] = true, ++made;
+            halve(*to, from);
+        }
+        return made > 0;
+    }
+
+    // Ellipsoid `b` becomes one half of itself, `a` the other.
+    void halve(uint32_t b, uint32_t a) {
+        const Fit whole = fits_[b];
+        const Mat q = whole.factor * whole.factor.transpose();
+        Matrix3 m;
+        for (size_t i = 0; i < 3; ++i)
+            for (size_t j = 0; j < 3; ++j) m[i][j] = q(int(i), int(j));
+        const Eigen3x3 axes = eigen_symmetric(m);
+        const Vec longest = std::sqrt(axes.values[0]) * Vec(axes.vectors[0][0], axes.vectors[1][0], axes.vectors[2][0]);
+        const Mat half = q - 0.65 * longest * longest.transpose();
+        fits_[b] = as_primitive(capped(whole.center - 0.45 * longest, half, options_.min_radius), options_.primitive);
+        fits_[a] = as_primitive(capped(whole.center + 0.45 * longest, half, options_.min_radius), options_.primitive);
+        momentum_[a] = momentum_[b] = {};
+    }
+
+    // For each ellipsoid, the nodes of the field that it alone covers, inside and outside the solid.
+    std::pair<std::vector<double>, std::vector<double>> exclusive_volumes() const {
+        const auto& size = field_.size();
+        constexpr uint32_t kNone = UINT32_MAX, kSeveral = UINT32_MAX - 1;
+        std::vector<uint32_t> coverer(field_.values().size(), kNone);
+        for (uint32_t i = 0; i < fits_.size(); ++i) {
+            const Vec half = fits_[i].half_extents();
+            std::array<int, 3> low, high;
+            for (int a = 0; a < 3; ++a) {
+                const double first = (fits_[i].center[a] - half[a] - field_.origin()[a]) / field_.pitch();
+                const double last = (fits_[i].center[a] + half[a] - field_.origin()[a]) / field_.pitch();
+                const double end = size[static_cast<size_t>(a)];
+                low[static_cast<size_t>(a)] = static_cast<int>(std::clamp(std::ceil(first), 0.0, end));
+                high[static_cast<size_t>(a)] = static_cast<int>(std::clamp(std::floor(last), -1.0, end - 1));
+            }
+            for (int x = low[0]; x <= high[0]; ++x)
+                for (int y = low[1]; y <= high[1]; ++y)
+                    for (int z = low[2]; z <= high[2]; ++z)
+                        if (fits_[i].radial_squared(field_.origin() + field_.pitch() * Vec(x, y, z)) <= 1) {
+                            uint32_t& by = coverer[field_.index(x, y, z)];
+                            by = by == kNone ? i : kSeveral;
+                        }
+        }
+        std::pair<std::vector<double>, std::vector<double>> out;
+        out.first.assign(fits_.size(), 0), out.second.assign(fits_.size(), 0);
+        for (size_t v = 0; v < coverer.size(); ++v)
+            if (coverer[v] < kSeveral) ++(field_.values()[v] < 0 ? out.first : out.second)[coverer[v]];
+        return out;
+    }
+
+    struct Pull {
+        Vec s;
+        Mat g;
+    };
+
+    const EllipsoidSet& set_;
+    std::vector<Fit>& fits_;
+    const DistanceField& field_;
+    std::span<const Vec> points_;
+    std::vector<uint32_t> owner_;
+    const DescentOptions& options_;
+    Random random_;
+    const std::vector<Vec> directions_;
+    std::vector<Vec> rotated_;
+    std::vector<float> multiplier_; // of each point
+    std::vector<Pull> pull_;        // of all points on each ellipsoid
+    std::vector<Momentum> momentum_;
+    double decay_mean_ = kMean, decay_square_ = kSquare; // powers of the above: what is missing from young averages
+    std::vector<std::vector<uint32_t>> neighbours_;
+    double kappa_ = 1, step_ = kFirstStep;
+};
+
+} // namespace
+
+void descend(EllipsoidSet& set, const DistanceField& field, std::span<const Vec> points, std::vector<uint32_t> owner,
+             const DescentOptions& options) {
+    Descent(set, field, points, std::move(owner), options).run();
+}
+
+std::vector<Vec> even_directions(int count) {
+    // Cosine and sine of the golden angle pi (3 - sqrt 5), and no others: libraries differ in their last digits.
+    constexpr double kCos = -0.73736887807831985597, kSin = 0.67549029426152362732;
+    std::vector<Vec> out;
+    double c = 1, s = 0;
+    for (int i = 0; i < count; ++i) {
+        const double z = 1 - (2 * i + 1.0) / count, r = std::sqrt(1 - z * z);
+        out.emplace_back(r * c, r * s, z);
+        const double turned = c * kCos - s * kSin;
+        s = s * kCos + c * kSin, c = turned;
+        const double length = std::sqrt(c * c + s * s);
+        c /= length, s /= length;
+    }
+    return out;
+}
+
+Mat random_rotation(Random& random) {
+    for (;;) { // a unit quaternion, by rejection
+        double q[4], norm = 0;
+        for (double& x : q) x = random.symmetric(), norm += x * x;
+        if (norm > 1 || norm < 1e-3) continue;
+        norm = std::sqrt(norm);
+        const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
+        Mat out;
+        out << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), //
+            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),    //
+            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y);
+        return out;
+    }
+}
+
+Fit as_primitive(const Fit& fit, Primitive primitive) {
+    if (primitive == Primitive::ellipsoid) return fit;
+    return {fit.center, Mat(std::cbrt(fit.factor.determinant()) * Mat::Identity())};
+}
+
+Fit moved(const Fit& fit, const Vec& s, const Mat& g, double min_radius) {
+    const Mat factor = fit.factor * (Mat::Identity() + g);
+    const Vec center = fit.center + fit.factor * s;
+    const Fit out(center, cholesky(factor * factor.transpose()));
+    return within_caps(out, min_radius) ? out : capped(center, factor * factor.transpose(), min_radius);
+}
+
+std::vector<std::vector<uint32_t>> neighbours_of(std::span<const Fit> fits, double margin) {
+    // Sweep and prune along the axis in which the centers spread most.
+    Box box;
+    for (const Fit& fit : fits) box.add(fit.center);
+    int axis = 0;
+    box.size().maxCoeff(&axis);
+    std::vector<Vec> half(fits.size());
+    std::vector<uint32_t> order(fits.size());
+    std::iota(order.begin(), order.end(), 0u);
+    for (size_t i = 0; i < fits.size(); ++i) half[i] = margin * fits[i].half_extents();
+    const auto low = [&](uint32_t i) { return fits[i].center[axis] - half[i][axis]; };
+    std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return low(a) < low(b); });
+    std::vector<std::vector<uint32_t>> out(fits.size());
+    for (size_t a = 0; a < order.size(); ++a) {
+        const uint32_t i = order[a];
+        const double end = fits[i].center[axis] + half[i][axis];
+        for (size_t b = a + 1; b < order.size() && low(order[b]) <= end; ++b) {
+            const uint32_t j = order[b];
+            const Vec gap = (fits[i].center - fits[j].center).cwiseAbs() - half[i] - half[j];
+            if ((gap.array() <= 0).all()) out[i].push_back(j), out[j].push_back(i);
+        }
+    }
+    for (std::vector<uint32_t>& list : out) std::sort(list.begin(), list.end());
+    return out;
+}
+
+} // namespace prolate

@@ -1,0 +1,119 @@
+// Exact trees are proved triangle by triangle: an ellipsoid is convex, so one that holds a triangle's corners holds the
+// triangle.
+//
+// Rounding: corners and nodes are floats, taken as exact. Forward substitution of L y = p - c is backward stable, so
+// the computed y is wrong by less than 8 * 2^-53 |L| |L^-1| |y| (Higham, Accuracy and Stability, section 8.1);
+// kRounding asks for more than that below 1.
+#include "builder/verify_exact.hpp"
+
+#include "builder/fit.hpp"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace prolate {
+namespace {
+
+constexpr double kRounding = 0x1p-48;
+
+// Corners of a triangle from the least one on, in the triangle's order: the same for the same oriented triangle.
+using Corners = std::array<std::tuple<float, float, float>, 3>;
+
+template <class Position> std::vector<Corners> sorted_corners(uint32_t count, Position&& position) {
+    std::vector<Corners> out(count);
+    for (uint32_t t = 0; t < count; ++t) {
+        for (size_t i = 0; i < 3; ++i) {
+            const Vec3 p = position(t, i);
+            out[t][i] = {p.x, p.y, p.z};
+        }
+        std::rotate(out[t].begin(), std::min_element(out[t].begin(), out[t].end()), out[t].end());
+    }
+    tbb::parallel_sort(out.begin(), out.end());
+    return out;
+}
+
+// A point that nobody vouches for, of the surface.
+struct Doubt {
+    bool any = false;
+    double point[3] = {};
+    void set(double x, double y, double z) {
+        if (!any) point[0] = x, point[1] = y, point[2] = z;
+        any = true;
+    }
+};
+
+// Looks for a triangle that only one of the two has.
+Doubt compare(const TreeView& tree, MeshView mesh) {
+    const auto ours =
+        sorted_corners(tree.triangle_count(), [&](uint32_t t, size_t i) { return tree.vertex(tree.triangle(t)[i]); });
+    const auto theirs = sorted_corners(static_cast<uint32_t>(mesh.triangles.size()),
+                                       [&](uint32_t t, size_t i) { return mesh.vertices[mesh.triangles[t][i]]; });
+    Doubt out;
+    const auto [mine, other] = std::mismatch(ours.begin(), ours.end(), theirs.begin(), theirs.end());
+    if (mine == ours.end() && other == theirs.end()) return out;
+    const bool missing = mine == ours.end() || (other != theirs.end() && *other < *mine);
+    const auto [x, y, z] = (missing ? *other : *mine)[0];
+    out.set(x, y, z);
+    return out;
+}
+
+// For each node, a corner beneath it that it does not hold.
+std::vector<Doubt> find_doubts(const TreeView& tree) {
+    const uint32_t nodes = tree.node_count();
+    std::vector<uint32_t> parent(nodes, 0);
+    std::vector<Ellipsoid> ellipsoids(nodes);
+    std::vector<double> largest(nodes); // squared radial coordinate within, beyond doubt
+    for (uint32_t n = 0; n < nodes; ++n) {
+        const ChildRange children = tree.children(n);
+        for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
+        ellipsoids[n] = tree.ellipsoid(n);
+        const Fit fit(ellipsoids[n]);
+        largest[n] = 1 - kRounding * fit.factor.norm() * fit.inverse.norm();
+    }
+    std::vector<Doubt> doubts(nodes);
+    for (uint32_t leaf = 0; leaf < nodes; ++leaf) {
+        const TriangleRange triangles = tree.triangles(leaf);
+        for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
+            for (const uint32_t corner : tree.triangle(t)) {
+                const Vec3 v = tree.vertex(corner);
+                const double p[3] = {v.x, v.y, v.z};
+                for (uint32_t node = leaf;; node = parent[node]) {
+                    if (!(radial_squared(ellipsoids[node], p) <= largest[node])) doubts[node].set(p[0], p[1], p[2]);
+                    if (node == 0) break;
+                }
+            }
+    }
+    return doubts;
+}
+
+} // namespace
+
+void verify_exact(const TreeView& tree, MeshView mesh, VerifyReport& report) {
+    const Doubt other_mesh = compare(tree, mesh);
+    const std::vector<Doubt> doubts = find_doubts(tree);
+    report.exact = true;
+    report.same_mesh = !other_mesh.any;
+    report.covered = true;
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        LevelProof& proof = report.levels.emplace_back();
+        proof.pieces = tree.triangle_count();
+        Doubt doubt = other_mesh;
+        tree.for_each_in_cut(l, [&](uint32_t node) {
+            if (const Doubt& d = doubts[node]; d.any) doubt.set(d.point[0], d.point[1], d.point[2]);
+        });
+        proof.covered = !doubt.any;
+        if (proof.covered) continue;
+        report.covered = false;
+        std::copy_n(doubt.point, 3, proof.point);
+        double nearest = HUGE_VAL; // another node may hold the point, though not its triangle
+        tree.for_each_in_cut(
+            l, [&](uint32_t node) { nearest = std::min(nearest, radial_squared(tree.ellipsoid(node), doubt.point)); });
+        proof.has_counterexample = nearest > 1;
+        proof.depth = proof.has_counterexample ? std::sqrt(nearest) - 1 : 0;
+    }
+}
+
+} // namespace prolate

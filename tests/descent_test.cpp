@@ -1,0 +1,320 @@
+// The joint descent: onto solids whose best covers are known.
+#include "builder/columns.hpp"
+#include "builder/descent.hpp"
+#include "builder/random.hpp"
+#include "tests/shapes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+Vec random_vec(Random& random) {
+    const double x = random.symmetric(), y = random.symmetric(), z = random.symmetric();
+    return {x, y, z};
+}
+
+Fit ball(const Vec& center, double radius) {
+    return {center, radius * Mat::Identity()};
+}
+
+/// A closed mesh around the unit ball mapped by `fit`.
+Mesh mesh_of(const Fit& fit, int subdivisions = 4) {
+    Mesh mesh = shapes::icosphere(subdivisions);
+    for (Vec3& v : mesh.vertices) {
+        const Vec p = fit.center + fit.factor * to_vec(v);
+        v = {float(p.x()), float(p.y()), float(p.z())};
+    }
+    return mesh;
+}
+
+std::vector<Vec> points_of(const Mesh& mesh) {
+    std::vector<Vec> out;
+    for (const Vec3& v : mesh.vertices) out.push_back(to_vec(v));
+    return out;
+}
+
+std::vector<uint32_t> nearest_of(std::span<const Fit> fits, std::span<const Vec> points) {
+    std::vector<uint32_t> out;
+    for (const Vec& p : points) {
+        const auto nearer = [&](const Fit& a, const Fit& b) { return a.radial_squared(p) < b.radial_squared(p); };
+        out.push_back(static_cast<uint32_t>(std::min_element(fits.begin(), fits.end(), nearer) - fits.begin()));
+    }
+    return out;
+}
+
+const std::atomic<bool> kNotCancelled = false;
+
+DescentOptions options_for(int iterations, Primitive primitive = Primitive::ellipsoid) {
+    return {{0.5, 0.5, 0.3}, primitive, iterations, 256, 1e-5, false, 1, 7, &kNotCancelled};
+}
+
+void descend_onto(const Mesh& mesh, EllipsoidSet& set, const DescentOptions& options) {
+    const DistanceField field(mesh.view(), true, Winding(mesh.view()), 60);
+    const std::vector<Vec> points = points_of(mesh);
+    descend(set, field, points, nearest_of(set.fits, points), options);
+}
+
+CoverVolume measure(const Mesh& mesh, std::span<const Fit> fits) {
+    std::vector<Ellipsoid> ellipsoids;
+    for (const Fit& fit : fits) ellipsoids.push_back(fit.ellipsoid());
+    return measure_cover(measuring_columns(mesh.view(), true, Winding(mesh.view()), 200), ellipsoids);
+}
+
+double uncovered(const CoverVolume& volume) {
+    return volume.solid.value - (volume.whole.value - volume.outside.value);
+}
+
+TEST(EvenDirections, AreEvenAndOfUnitLength) {
+    for (const int count : {1, 2, 96, 384, 2000}) {
+        const std::vector<Vec> directions = even_directions(count);
+        ASSERT_EQ(directions.size(), static_cast<size_t>(count));
+        for (const Vec& d : directions) EXPECT_NEAR(d.norm(), 1, 1e-12);
+        if (count < 96) continue;
+        Vec mean = Vec::Zero();
+        Mat second = Mat::Zero();
+        for (const Vec& d : directions) mean += d / count, second += d * d.transpose() / count;
+        EXPECT_LT(mean.norm(), 0.01);
+        EXPECT_LT((second - Mat::Identity() / 3).norm(), 0.01);
+        // No direction is lonely or crowded: a cap that is theirs alone has about 4 pi / count.
+        const double width = std::sqrt(4 * std::numbers::pi / count);
+        for (const Vec& d : directions) {
+            double nearest = 2;
+            for (const Vec& e : directions)
+                if (&e != &d) nearest = std::min(nearest, (d - e).norm());
+            EXPECT_GT(nearest, 0.6 * width);
+            EXPECT_LT(nearest, 1.2 * width);
+        }
+    }
+}
+
+TEST(RandomRotation, IsARotationAndSpreadsEvenly) {
+    Random random(1);
+    Vec mean = Vec::Zero();
+    for (int round = 0; round < 2000; ++round) {
+        const Mat r = random_rotation(random);
+        EXPECT_LT((r * r.transpose() - Mat::Identity()).norm(), 1e-12);
+        EXPECT_NEAR(r.determinant(), 1, 1e-12);
+        mean += r.col(0) / 2000;
+    }
+    EXPECT_LT(mean.norm(), 0.05);
+}
+
+TEST(AsPrimitive, KeepsTheVolume) {
+    const Fit fit(Vec(1, 2, 3), (Mat() << 2, 0, 0, 0.3, 1, 0, -0.2, 0.4, 0.5).finished());
+    const Fit sphere = as_primitive(fit, Primitive::sphere);
+    EXPECT_NEAR(sphere.volume(), fit.volume(), 1e-12);
+    EXPECT_EQ(sphere.factor, sphere.factor(0, 0) * Mat::Identity());
+    EXPECT_EQ(sphere.center, fit.center);
+    EXPECT_EQ(as_primitive(fit, Primitive::ellipsoid).factor, fit.factor);
+}
+
+TEST(Moved, IsTheMappedEllipsoid) {
+    Random random(2);
+    for (int round = 0; round < 500; ++round) {
+        const Fit fit = capped(random_vec(random), Vec(1 + random.uniform(), 1, 0.5).asDiagonal(), 1e-6);
+        const Vec s = 0.3 * random_vec(random);
+        Mat g;
+        for (int i = 0; i < 9; ++i) g(i / 3, i % 3) = 0.1 * random.symmetric();
+        g = (g + g.transpose()).eval();
+        const Fit out = moved(fit, s, g, 1e-6);
+        EXPECT_EQ(out.factor, Mat(out.factor.triangularView<Eigen::Lower>()));
+        for (int i = 0; i < 5; ++i) { // c + L u goes to c + L (s + (1 + G) u): the border stays the border
+            const Vec u = random_vec(random).normalized();
+            EXPECT_NEAR(out.radial_squared(fit.center + fit.factor * (s + u + g * u)), 1, 1e-9);
+        }
+    }
+    // Squeezed flat: within the caps all the same.
+    const Fit flat = moved(ball(Vec::Zero(), 1), Vec::Zero(), Vec(0, 0, -0.999).asDiagonal(), 1e-6);
+    EXPECT_TRUE(within_caps(flat, 1e-6));
+    EXPECT_TRUE(within_caps(moved(ball(Vec::Zero(), 1), Vec::Zero(), -0.999 * Mat::Identity(), 0.1), 0.1));
+}
+
+TEST(NeighboursOf, AreThoseOfBruteForce) {
+    Random random(3);
+    for (const size_t count : {0u, 1u, 2u, 60u, 300u}) {
+        std::vector<Fit> fits;
+        for (size_t i = 0; i < count; ++i) {
+            const Vec axis = random_vec(random).normalized();
+            const Vec center = random_vec(random);
+            fits.push_back(capped(center, 0.01 * (Mat::Identity() * 0.1 + axis * axis.transpose()), 1e-6));
+        }
+        for (const double margin : {1.0, 1.2, 3.0}) {
+            const auto found = neighbours_of(fits, margin);
+            ASSERT_EQ(found.size(), count);
+            for (uint32_t i = 0; i < count; ++i) {
+                std::vector<uint32_t> expected;
+                for (uint32_t j = 0; j < count; ++j) {
+                    const Vec gap = (fits[i].center - fits[j].center).cwiseAbs() - margin * fits[i].half_extents() -
+                                    margin * fits[j].half_extents();
+                    if (i != j && gap.maxCoeff() <= 0) expected.push_back(j);
+                }
+                EXPECT_EQ(found[i], expected);
+            }
+        }
+    }
+}
+
+TEST(Descent, FindsTheEllipsoidThatTheSolidIs) {
+    Random random(4);
+    for (int round = 0; round < 5; ++round) {
+        const Mat turn = random_rotation(random);
+        const Vec radii(1, 0.5 + 0.3 * random.uniform(), 0.3);
+        const Fit solid = capped(random_vec(random), turn * radii.cwiseAbs2().asDiagonal() * turn.transpose(), 1e-6);
+        const Mesh mesh = mesh_of(solid);
+        EllipsoidSet set{{ball(solid.center + 0.3 * random_vec(random), 0.5)}, {}, {}};
+        descend_onto(mesh, set, options_for(200));
+        const CoverVolume volume = measure(mesh, set.fits);
+        EXPECT_LT(volume.outside.value, 0.03 * volume.solid.value);
+        EXPECT_LT(uncovered(volume), 5e-3 * volume.solid.value);
+        EXPECT_LT((set.fits[0].center - solid.center).norm(), 0.01);
+        const Mat difference = solid.inverse * set.fits[0].factor;
+        EXPECT_LT((difference * difference.transpose() - Mat::Identity()).norm(), 0.05);
+    }
+}
+
+TEST(Descent, SharesTwoBallsBetweenTwoEllipsoids) {
+    Mesh mesh = mesh_of(ball({0, 0, 0}, 0.5), 3);
+    shapes::append(mesh, mesh_of(ball({1.5, 0.5, 0}, 0.3), 3));
+    for (const Primitive primitive : {Primitive::ellipsoid, Primitive::sphere}) {
+        // From too large and in between, and from inside.
+        for (const auto& start : {std::pair(ball({0.3, 0.2, 0}, 0.8), ball({1, 0.3, 0.1}, 0.6)),
+                                  std::pair(ball({0.1, 0.1, 0}, 0.1), ball({1.4, 0.5, 0}, 0.1))}) {
+            EllipsoidSet set{{start.first, start.second}, {}, {}};
+            descend_onto(mesh, set, options_for(200, primitive));
+            const CoverVolume volume = measure(mesh, set.fits);
+            EXPECT_LT(volume.outside.value, 0.04 * volume.solid.value);
+            EXPECT_LT(uncovered(volume), 5e-3 * volume.solid.value);
+            EXPECT_LT((set.fits[0].center - Vec(0, 0, 0)).norm(), 0.02);
+            EXPECT_LT((set.fits[1].center - Vec(1.5, 0.5, 0)).norm(), 0.02);
+        }
+    }
+}
+
+// Ellipsoids around a ring.
+EllipsoidSet around_a_torus(int count) {
+    EllipsoidSet set;
+    for (int i = 0; i < count; ++i) {
+        const double angle = 2 * std::numbers::pi * i / count;
+        set.fits.push_back(ball({std::cos(angle), std::sin(angle), 0}, 0.35 + 0.01 * (i % 3)));
+    }
+    return set;
+}
+
+TEST(Descent, NearlyCoversAndGetsTighter) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
+    EllipsoidSet set = around_a_torus(8);
+    descend_onto(mesh, set, options_for(150));
+    const CoverVolume volume = measure(mesh, set.fits);
+    EXPECT_LT(volume.outside.value, 0.2 * volume.solid.value);
+    EXPECT_LT(uncovered(volume), 0.01 * volume.solid.value);
+    for (const Fit& fit : set.fits) EXPECT_TRUE(within_caps(fit, 1e-5));
+}
+
+TEST(Descent, LetsIdleEllipsoidsHelpElsewhere) {
+    // Five of six are on one ball of three.
+    Mesh mesh = mesh_of(ball({0, 0, 0}, 0.5), 3);
+    shapes::append(mesh, mesh_of(ball({2, 0, 0}, 0.5), 3));
+    shapes::append(mesh, mesh_of(ball({4, 0, 0}, 0.5), 3));
+    EllipsoidSet start;
+    for (int i = 0; i < 5; ++i) start.fits.push_back(ball({0.05 * i, 0.05 * i, 0}, 0.45));
+    start.fits.push_back(ball({3, 0, 0}, 1.6));
+    double outside[2];
+    for (const bool relocate : {false, true}) {
+        EllipsoidSet set = start;
+        DescentOptions options = options_for(200);
+        options.relocate = relocate;
+        descend_onto(mesh, set, options);
+        const CoverVolume volume = measure(mesh, set.fits);
+        outside[relocate] = volume.outside.value / volume.solid.value;
+        EXPECT_LT(uncovered(volume), 0.02 * volume.solid.value);
+    }
+    EXPECT_LT(outside[1], 0.1);
+    EXPECT_GT(outside[0], 0.2); // without, it stays between the two
+}
+
+TEST(Descent, SpheresStaySpheres) {
+    EllipsoidSet set = around_a_torus(12);
+    DescentOptions options = options_for(60, Primitive::sphere);
+    options.relocate = true;
+    descend_onto(shapes::torus(1, 0.3f, 40, 20), set, options);
+    for (const Fit& fit : set.fits) EXPECT_EQ(fit.factor, fit.factor(0, 0) * Mat::Identity());
+}
+
+TEST(Descent, IsTheSameForAnyNumberOfThreads) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 40, 20);
+    EllipsoidSet sets[2] = {around_a_torus(30), around_a_torus(30)};
+    for (const size_t run : {0u, 1u})
+        tbb::task_arena(run == 0 ? 1 : 4).execute([&] {
+            DescentOptions options = options_for(40);
+            options.relocate = true;
+            descend_onto(mesh, sets[run], options);
+        });
+    for (size_t i = 0; i < sets[0].fits.size(); ++i) {
+        EXPECT_EQ(sets[0].fits[i].center, sets[1].fits[i].center);
+        EXPECT_EQ(sets[0].fits[i].factor, sets[1].fits[i].factor);
+    }
+}
+
+TEST(Descent, AChildDoesNotCountBeyondItsParents) {
+    // A bar whose halves two parents have, with some overlap. The first child starts around all of the bar, the second
+    // one tiny at the right end, where the first one covers - but its parent does not.
+    const Mesh bar = mesh_of(Fit(Vec::Zero(), Vec(2, 0.3, 0.3).asDiagonal().toDenseMatrix()));
+    const std::vector<Fit> start{Fit(Vec::Zero(), Vec(2.02, 0.31, 0.31).asDiagonal().toDenseMatrix()),
+                                 ball({1.7, 0, 0}, 0.1)};
+    const auto half = [](double x) { return Fit({x, 0, 0}, Vec(1.6, 1, 1).asDiagonal().toDenseMatrix()); };
+    EllipsoidSet set{start, {0, 1}, {{half(-1.2)}, {half(1.2)}}};
+    descend_onto(bar, set, options_for(250));
+    for (const Vec& p : points_of(bar)) {
+        double nearest = HUGE_VAL;
+        for (size_t i = 0; i < 2; ++i)
+            if (set.chain(i)[0].radial_squared(p) <= 1) nearest = std::min(nearest, set.fits[i].radial_squared(p));
+        EXPECT_LT(nearest, 1.1) << p.transpose();
+    }
+    EXPECT_LT(set.fits[1].center.x() - set.fits[1].half_extents().x(), 0.45); // where the left parent ends
+    // Without parents nothing makes it grow.
+    EllipsoidSet free{start, {}, {}};
+    descend_onto(bar, free, options_for(250));
+    EXPECT_LT(free.fits[1].half_extents().x(), 0.2);
+}
+
+TEST(Descent, PointsWantAnEllipsoidThatMayHaveThem) {
+    // As above, with a sheet, and nothing else that counts: only points pull, and all of them begin in the first child.
+    const Mesh sheet = shapes::moved(shapes::sheet(4, 0.4f, 20), {-2, -0.2f, 0});
+    const auto half = [](double x) { return Fit({x, 0, 0}, Vec(1.6, 1, 1).asDiagonal().toDenseMatrix()); };
+    EllipsoidSet set{{Fit(Vec::Zero(), Vec(2.2, 0.5, 0.1).asDiagonal().toDenseMatrix()), ball({1.7, 0, 0}, 0.1)},
+                     {0, 1},
+                     {{half(-1.2)}, {half(1.2)}}};
+    const DistanceField field(sheet.view(), false, Winding(sheet.view()), 60);
+    const std::vector<Vec> points = points_of(sheet);
+    DescentOptions options = options_for(250);
+    options.objective = {0, 0, 1};
+    descend(set, field, points, std::vector<uint32_t>(points.size(), 0), options);
+    for (const Vec& p : points)
+        if (p.x() > 0.5) {
+            EXPECT_LT(set.fits[1].radial_squared(p), 1.2) << p.transpose();
+        }
+}
+
+TEST(Descent, StopsWhenCancelled) {
+    EllipsoidSet set = around_a_torus(4);
+    const std::vector<Fit> before = set.fits;
+    const std::atomic<bool> cancelled = true;
+    DescentOptions options = options_for(1000);
+    options.cancelled = &cancelled;
+    descend_onto(shapes::torus(1, 0.3f, 40, 20), set, options);
+    for (size_t i = 0; i < before.size(); ++i) EXPECT_EQ(set.fits[i].center, before[i].center);
+}
+
+} // namespace
+} // namespace prolate

@@ -1,0 +1,309 @@
+// Starts and polish: whatever the start was, the result covers every piece.
+#include "builder/polish.hpp"
+#include "builder/random.hpp"
+#include "builder/start.hpp"
+#include "tests/shapes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <numeric>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+constexpr double kMinRadius = 1e-5;
+const std::atomic<bool> kNotCancelled = false;
+
+// A mesh and what is derived from it.
+struct Scene {
+    Mesh mesh;
+    bool closed;
+    Winding winding{mesh.view()};
+    DistanceField field{mesh.view(), closed, winding, 40};
+    Voxels cells{mesh.view(), closed, winding, 20};
+    Pieces pieces{mesh.view(), closed, winding, 32};
+    Columns columns = measuring_columns(mesh.view(), closed, winding, 96);
+
+    explicit Scene(Mesh m, bool is_closed = true) : mesh(std::move(m)), closed(is_closed) {}
+    double outside(std::span<const Fit> fits) const {
+        std::vector<Ellipsoid> ellipsoids;
+        for (const Fit& fit : fits) ellipsoids.push_back(fit.ellipsoid());
+        return measure_cover(columns, ellipsoids).outside.value;
+    }
+    std::vector<uint32_t> all_cells() const {
+        std::vector<uint32_t> out(cells.cell_count());
+        std::iota(out.begin(), out.end(), 0u);
+        return out;
+    }
+    std::vector<Cluster> merged(std::span<const uint32_t> members, uint32_t k) const {
+        return merge_start(cells, members, k, 16, kMinRadius,
+                           [this](const Fit& fit) { return sampled_outside_volume(fit, field); });
+    }
+};
+
+Mesh crowd() {
+    Mesh mesh;
+    for (const float x : {0.0f, 3.0f, 6.0f, 9.0f, 12.0f})
+        shapes::append(mesh, shapes::moved(shapes::icosphere(1), {x, std::fmod(x, 2.0f), 0}, 0.4f));
+    return mesh;
+}
+
+std::vector<std::unique_ptr<Scene>> scenes() {
+    std::vector<std::unique_ptr<Scene>> out;
+    out.push_back(std::make_unique<Scene>(shapes::torus(1, 0.3f, 40, 20)));
+    out.push_back(std::make_unique<Scene>(shapes::box(1, 2, 0.02f)));
+    out.push_back(std::make_unique<Scene>(crowd()));
+    out.push_back(std::make_unique<Scene>(shapes::sheet(2, 1, 6), false));
+    return out;
+}
+
+// --- starts ---------------------------------------------------------------------------------------------------------
+
+void expect_partition(const Scene& scene, const std::vector<Cluster>& clusters, std::span<const uint32_t> cells) {
+    std::vector<uint32_t> seen;
+    for (const Cluster& cluster : clusters) {
+        EXPECT_FALSE(cluster.cells.empty());
+        EXPECT_TRUE(std::ranges::is_sorted(cluster.cells));
+        EXPECT_TRUE(within_caps(cluster.fit, kMinRadius));
+        seen.insert(seen.end(), cluster.cells.begin(), cluster.cells.end());
+        // The ellipsoid is about where its cells are.
+        Box box;
+        for (const uint32_t cell : cluster.cells) box.add(scene.cells.box(cell));
+        const Vec half = 0.5 * box.size() + Vec::Constant(scene.cells.pitch());
+        EXPECT_TRUE(((cluster.fit.center - box.center()).cwiseAbs().array() <= half.array()).all());
+    }
+    std::ranges::sort(seen);
+    EXPECT_TRUE(std::ranges::equal(seen, cells));
+}
+
+void expect_same(const std::vector<Cluster>& a, const std::vector<Cluster>& b) {
+    ASSERT_EQ(a.size(), b.size());
+    for (size_t i = 0; i < a.size(); ++i) {
+        EXPECT_EQ(a[i].cells, b[i].cells);
+        EXPECT_EQ(a[i].fit.factor, b[i].fit.factor);
+        EXPECT_EQ(a[i].fit.center, b[i].fit.center);
+    }
+}
+
+TEST(Start, IsAPartitionInAsManyClustersAsAsked) {
+    for (const auto& scene : scenes()) {
+        const std::vector<uint32_t> all = scene->all_cells();
+        std::vector<uint32_t> some;
+        Random random(1);
+        for (const uint32_t cell : all)
+            if (random.uniform() < 0.4) some.push_back(cell);
+        const std::vector<uint32_t> few(all.begin() + 3, all.begin() + 8), none;
+        for (const std::vector<uint32_t>& cells : {all, some, few, none})
+            for (const uint32_t k : {1u, 2u, 7u, 64u, 100u}) {
+                const auto expected = std::min<size_t>(k, cells.size());
+                if (k <= 64) {
+                    const auto merged = scene->merged(cells, k);
+                    EXPECT_EQ(merged.size(), expected);
+                    expect_partition(*scene, merged, cells);
+                    expect_same(merged, scene->merged(cells, k));
+                }
+                const auto spread = spread_start(scene->cells, cells, k, 5, kMinRadius);
+                EXPECT_LE(spread.size(), expected);
+                EXPECT_GE(static_cast<double>(spread.size()), 0.9 * static_cast<double>(expected));
+                expect_partition(*scene, spread, cells);
+                expect_same(spread, spread_start(scene->cells, cells, k, 5, kMinRadius));
+            }
+    }
+}
+
+TEST(Start, MergingFindsSeparateParts) {
+    const Scene scene(crowd());
+    const auto clusters = scene.merged(scene.all_cells(), 5);
+    ASSERT_EQ(clusters.size(), 5u);
+    for (const Cluster& cluster : clusters) {
+        EXPECT_LT(cluster.fit.half_extents().maxCoeff(), 0.6);
+        const double i = std::round(cluster.fit.center.x() / 3);
+        EXPECT_LT((cluster.fit.center - Vec(3 * i, std::fmod(3 * i, 2), 0)).norm(), 0.1);
+    }
+}
+
+TEST(SampledOutsideVolume, IsTheEllipsoidsVolumeOutsideTheSolid) {
+    const Scene scene(shapes::icosphere(3));
+    const double inner = shapes::enclosed_volume(scene.mesh);
+    const auto of = [&](const Fit& fit) { return sampled_outside_volume(fit, scene.field); };
+    EXPECT_NEAR(of(Fit(Vec::Zero(), 0.8 * Mat::Identity())), 0, 1e-9);
+    EXPECT_NEAR(of(Fit(Vec(5, 0, 0), 0.5 * Mat::Identity())), Fit().volume() / 8, 1e-9);
+    for (const double stretch : {1.2, 2.0, 3.0}) {
+        const Fit fit(Vec::Zero(), Vec(1.1, stretch, 1.2).asDiagonal().toDenseMatrix());
+        EXPECT_NEAR(of(fit), fit.volume() - inner, 0.05 * fit.volume());
+    }
+}
+
+// --- polish ---------------------------------------------------------------------------------------------------------
+
+EllipsoidSet spread(const Scene& scene, uint32_t k, Primitive primitive, double scale = 1) {
+    EllipsoidSet set;
+    for (const Cluster& cluster : spread_start(scene.cells, scene.all_cells(), k, 3, kMinRadius)) {
+        const Fit fit =
+            capped(cluster.fit.center, scale * scale * cluster.fit.factor * cluster.fit.factor.transpose(), kMinRadius);
+        set.fits.push_back(as_primitive(fit, primitive));
+    }
+    return set;
+}
+
+PolishOptions options_for(const Scene& scene, Primitive primitive, int sweeps = 6) {
+    return {{0.5, 0.5, 0.2},
+            primitive,
+            sweeps,
+            128,
+            kMinRadius,
+            {},
+            [&scene](std::span<const Fit> fits) { return scene.outside(fits); },
+            1,
+            &kNotCancelled};
+}
+
+void expect_cover(const EllipsoidSet& set, const Pieces& pieces, const std::vector<uint32_t>& owner) {
+    constexpr double kHeld = 1 + 1e-6;
+    ASSERT_EQ(owner.size(), pieces.size());
+    for (uint32_t piece = 0; piece < pieces.size(); ++piece) {
+        ASSERT_LT(owner[piece], set.fits.size());
+        EXPECT_LE(set.fits[owner[piece]].reach(pieces.points(piece)), kHeld);
+        for (const Fit& ancestor : set.chain(owner[piece])) EXPECT_LE(ancestor.reach(pieces.points(piece)), kHeld);
+    }
+}
+
+// The start, each ellipsoid enlarged until it has the pieces that it is nearest to.
+std::vector<Fit> inflated(const EllipsoidSet& set, const Pieces& pieces) {
+    std::vector<double> reach(set.fits.size(), 0);
+    for (uint32_t piece = 0; piece < pieces.size(); ++piece) {
+        size_t nearest = 0;
+        double least = HUGE_VAL;
+        for (size_t i = 0; i < set.fits.size(); ++i)
+            if (const double r = set.fits[i].reach(pieces.points(piece)); r < least) least = r, nearest = i;
+        reach[nearest] = std::max(reach[nearest], least);
+    }
+    std::vector<Fit> out;
+    for (size_t i = 0; i < set.fits.size(); ++i)
+        if (reach[i] > 0) out.push_back(set.fits[i].scaled(reach[i]));
+    return out;
+}
+
+TEST(Polish, CoversAllPiecesWithLessThanTheInflatedStart) {
+    for (const auto& scene : scenes())
+        for (const Primitive primitive : {Primitive::ellipsoid, Primitive::sphere})
+            for (const uint32_t k : {1u, 2u, 9u, 40u}) {
+                EllipsoidSet set = spread(*scene, k, primitive);
+                const double before = scene->outside(inflated(set, scene->pieces));
+                const auto owner = polish(set, scene->pieces, scene->field, options_for(*scene, primitive));
+                expect_cover(set, scene->pieces, owner);
+                EXPECT_LE(scene->outside(set.fits), before * (1 + 1e-6)) << k;
+                for (const Fit& fit : set.fits) {
+                    EXPECT_TRUE(within_caps(fit, kMinRadius));
+                    if (primitive == Primitive::sphere) {
+                        EXPECT_EQ(fit.factor, fit.factor(0, 0) * Mat::Identity());
+                    }
+                }
+            }
+}
+
+TEST(Polish, CoversFromTheWorstOfStarts) {
+    for (const auto& scene : scenes()) {
+        // Much too small, much too large, and all in one corner.
+        for (const double scale : {0.1, 3.0}) {
+            EllipsoidSet set = spread(*scene, 12, Primitive::ellipsoid, scale);
+            expect_cover(set, scene->pieces,
+                         polish(set, scene->pieces, scene->field, options_for(*scene, Primitive::ellipsoid)));
+        }
+        EllipsoidSet set;
+        const Vec corner = to_vec(scene->mesh.vertices[0]);
+        for (int i = 0; i < 6; ++i) set.fits.emplace_back(corner + 0.01 * i * Vec::Ones(), 0.02 * Mat::Identity());
+        expect_cover(set, scene->pieces,
+                     polish(set, scene->pieces, scene->field, options_for(*scene, Primitive::ellipsoid)));
+    }
+}
+
+TEST(Polish, FindsTheBallThatTheSolidIs) {
+    const Scene scene(shapes::icosphere(4));
+    EllipsoidSet set{{Fit(Vec(0.02, 0, 0), Vec(1.08, 1, 1.04).asDiagonal().toDenseMatrix())}, {}, {}};
+    const auto owner = polish(set, scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid, 40));
+    expect_cover(set, scene.pieces, owner);
+    EXPECT_LT(set.fits[0].volume(), 1.02 * Fit().volume());
+}
+
+TEST(Polish, IsTheSameForAnyNumberOfThreads) {
+    const Scene scene(shapes::torus(1, 0.3f, 40, 20));
+    EllipsoidSet sets[2] = {spread(scene, 30, Primitive::ellipsoid), spread(scene, 30, Primitive::ellipsoid)};
+    std::vector<uint32_t> owners[2];
+    for (const size_t run : {0u, 1u})
+        tbb::task_arena(run == 0 ? 1 : 4).execute([&] {
+            owners[run] = polish(sets[run], scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid));
+        });
+    EXPECT_EQ(owners[0], owners[1]);
+    for (size_t i = 0; i < sets[0].fits.size(); ++i) {
+        EXPECT_EQ(sets[0].fits[i].center, sets[1].fits[i].center);
+        EXPECT_EQ(sets[0].fits[i].factor, sets[1].fits[i].factor);
+    }
+}
+
+// Is the piece in an ellipsoid of this scale, and in that one's chain?
+bool held(const EllipsoidSet& set, const Pieces& pieces, uint32_t piece, double scale) {
+    for (size_t i = 0; i < set.fits.size(); ++i) {
+        bool all = set.fits[i].reach(pieces.points(piece)) <= scale;
+        for (const Fit& ancestor : set.chain(i)) all = all && ancestor.reach(pieces.points(piece)) <= 1 + 1e-6;
+        if (all) return true;
+    }
+    return false;
+}
+
+TEST(RefineSeams, CutsWhatNobodyHoldsAndNothingElse) {
+    Scene scene(shapes::torus(1, 0.3f, 40, 20));
+    const EllipsoidSet set = spread(scene, 20, Primitive::ellipsoid, 1.1);
+    const uint32_t count = scene.pieces.size();
+    std::vector<std::vector<Vec>> before;
+    for (uint32_t piece = 0; piece < count; ++piece)
+        before.emplace_back(scene.pieces.points(piece).begin(), scene.pieces.points(piece).end());
+    std::vector<bool> kept(count);
+    for (uint32_t piece = 0; piece < count; ++piece) kept[piece] = held(set, scene.pieces, piece, 1);
+    refine_seams(scene.pieces, set);
+    EXPECT_GT(scene.pieces.size(), count);
+    for (uint32_t piece = 0; piece < count; ++piece)
+        if (kept[piece]) {
+            EXPECT_TRUE(std::ranges::equal(before[piece], scene.pieces.points(piece)));
+        }
+    for (uint32_t piece = 0; piece < scene.pieces.size(); ++piece)
+        if (!held(set, scene.pieces, piece, 1.01)) {
+            EXPECT_FALSE(scene.pieces.refine(piece));
+        }
+}
+
+// Children of two parents that overlap: each piece must end in a child whose parent has it, also after cuts.
+TEST(Polish, KeepsToTheChains) {
+    for (const bool closed : {true, false}) {
+        Mesh mesh = shapes::torus(1, 0.3f, 40, 20);
+        if (!closed) // gashes: the inside fades there
+            std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] % 20 < 3 || t[0] % 160 < 40; });
+        Scene scene(mesh, closed);
+        EllipsoidSet parents = spread(scene, 4, Primitive::ellipsoid);
+        refine_seams(scene.pieces, parents);
+        const auto first = polish(parents, scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid));
+        expect_cover(parents, scene.pieces, first);
+        EllipsoidSet children;
+        for (uint32_t p = 0; p < parents.fits.size(); ++p) {
+            children.chains.push_back({parents.fits[p]});
+            for (int i = 0; i < 3; ++i) {
+                const double angle = std::atan2(parents.fits[p].center.y(), parents.fits[p].center.x()) + 0.4 * (i - 1);
+                children.fits.emplace_back(Vec(std::cos(angle), std::sin(angle), 0), 0.25 * Mat::Identity());
+                children.parent.push_back(p);
+            }
+        }
+        refine_seams(scene.pieces, children);
+        const auto owner = polish(children, scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid));
+        expect_cover(children, scene.pieces, owner);
+    }
+}
+
+} // namespace
+} // namespace prolate
