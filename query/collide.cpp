@@ -8,8 +8,14 @@
 // Sound because a child covers its part of the solid and A covers the parts of all its children: if A is apart from
 // B's child i, no part under A meets that part of B.
 //
+// Two leaves of exact trees meet if a triangle of one meets a triangle of the other; a leaf ellipsoid of a tree without
+// triangles stands for itself. If nothing meets, no surface crosses another, so each connected component of the one
+// lies wholly inside or outside of the other: one vertex a component (or center a leaf ellipsoid) tells.
+//
 // Complexity: 2k tests, then at most k^2, for each pair of inner nodes that meets. Stack: one frame a level.
+#include "query/inside.hpp"
 #include "query/separation.hpp"
+#include "query/triangle.hpp"
 
 #include <prolate/query.hpp>
 
@@ -47,10 +53,12 @@ class Descent {
 public:
     Descent(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, CollideContext::Frame* frames,
             const QueryOptions& options)
-        : a_(a), b_(b), b_to_a_(query::relative_pose(pose_a, pose_b)), frames_(frames), options_(options) {}
+        : a_(a), b_(b), pose_a_(pose_a), pose_b_(pose_b), b_to_a_(query::relative_pose(pose_a, pose_b)),
+          frames_(frames), options_(options) {}
 
     CollideResult run() {
         result_.verdict = descend();
+        if (result_.verdict == Verdict::separated && roots_meet_) result_.verdict = look_inside();
         return result_;
     }
 
@@ -97,8 +105,9 @@ private:
     Verdict descend() {
         const Test roots = test(0, 0, 0);
         if (roots == Test::no_budget) return Verdict::undecided;
-        if (roots == Test::apart) return Verdict::separated;
-        if (stays(a_, 0, 0) && stays(b_, 0, 0)) return Verdict::overlapping;
+        if (roots == Test::apart) return Verdict::separated; // what they enclose, too
+        roots_meet_ = true;
+        if (stays(a_, 0, 0) && stays(b_, 0, 0)) return leaves_meet(0, 0) ? Verdict::overlapping : Verdict::separated;
         uint32_t depth = 0; // the frame in work; its index is its level
         frames_[0] = {.node_a = 0, .node_b = 0, .children_a = 0, .children_b = 0, .next_a = 0, .next_b = 0, .level = 0};
         if (!open(frames_[0])) return Verdict::undecided;
@@ -126,6 +135,7 @@ private:
                 if (outcome == Test::apart) continue;
             }
             if (stays(a_, node_a, level) && stays(b_, node_b, level)) {
+                if (!leaves_meet(node_a, node_b)) continue;
                 result_.node_a = node_a, result_.node_b = node_b;
                 return Verdict::overlapping;
             }
@@ -141,11 +151,66 @@ private:
         }
     }
 
+    // Of two ellipsoids that meet and go no deeper: do their triangles, if they have any?
+    bool leaves_meet(uint32_t node_a, uint32_t node_b) {
+        if (!a_.is_leaf(node_a) || !b_.is_leaf(node_b)) return true; // max_level ended the descent
+        const TriangleRange in_a = a_.triangles(node_a), in_b = b_.triangles(node_b);
+        const auto meets = [&](const auto& x, const auto& y) {
+            ++result_.stats.triangle_tests;
+            return !query::apart(x, y);
+        };
+        if (in_a.count == 0 && in_b.count == 0) return true;
+        if (in_a.count == 0) {
+            const auto ellipsoid = query::place(a_.ellipsoid(node_a));
+            for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
+                if (meets(query::place(b_, t, b_to_a_), ellipsoid)) return result_.triangle_b = t, true;
+            return false;
+        }
+        if (in_b.count == 0) {
+            const auto ellipsoid = query::place(b_.ellipsoid(node_b), b_to_a_);
+            for (uint32_t t = in_a.first; t < in_a.first + in_a.count; ++t)
+                if (meets(query::place(a_, t), ellipsoid)) return result_.triangle_a = t, true;
+            return false;
+        }
+        for (uint32_t j = in_b.first; j < in_b.first + in_b.count; ++j) {
+            const auto triangle_b = query::place(b_, j, b_to_a_);
+            for (uint32_t i = in_a.first; i < in_a.first + in_a.count; ++i)
+                if (meets(query::place(a_, i), triangle_b)) return result_.triangle_a = i, result_.triangle_b = j, true;
+        }
+        return false;
+    }
+
+    // No surface meets another: is a part of one body inside the other?
+    Verdict look_inside() {
+        const Verdict first = encloses(a_, pose_a_, b_, pose_b_);
+        return first == Verdict::separated ? encloses(b_, pose_b_, a_, pose_a_) : first;
+    }
+    Verdict encloses(const TreeView& outer, const Pose& pose_outer, const TreeView& inner, const Pose& pose_inner) {
+        if (!outer.has_triangles() || outer.bake_info().surface_mode) return Verdict::separated;
+        const query::RelativePose to_outer = query::relative_pose(pose_outer, pose_inner);
+        const auto look = [&](const Vec3& p) {
+            const auto winding = query::winding_number(outer, query::place(p, to_outer), result_.stats.pair_tests,
+                                                       options_.max_pair_tests);
+            if (!winding) return Verdict::undecided;
+            result_.enclosed = *winding != 0;
+            return result_.enclosed ? Verdict::overlapping : Verdict::separated;
+        };
+        Verdict verdict = Verdict::separated;
+        for (uint32_t v = 0; v < inner.component_count() && verdict == Verdict::separated; ++v)
+            verdict = look(inner.vertex(v));
+        for (uint32_t n = 0; n < inner.node_count() && !inner.has_triangles() && verdict == Verdict::separated; ++n)
+            if (inner.is_leaf(n)) verdict = look(inner.ellipsoid(n).center);
+        return verdict;
+    }
+
     const TreeView& a_;
     const TreeView& b_;
+    const Pose& pose_a_;
+    const Pose& pose_b_;
     const query::RelativePose b_to_a_;
     Frame* const frames_;
     const QueryOptions& options_;
+    bool roots_meet_ = false;
     CollideResult result_;
 };
 
@@ -157,6 +222,7 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     if (!swap) return Descent(a, pose_a, b, pose_b, context.frames, options).run();
     CollideResult result = Descent(b, pose_b, a, pose_a, context.frames, options).run();
     std::swap(result.node_a, result.node_b);
+    std::swap(result.triangle_a, result.triangle_b);
     return result;
 }
 

@@ -21,9 +21,10 @@
 //   a, b                 |da| <= 7 u |n| |L1|, |db| <= 81 u |n| |L2|
 //   p - a - b            two more roundings, 2 u |n| S
 // so that the computed p - a - b is wrong by at most 83 u |n| S + O(u^2), S = |c1| + |c2| + |d| + |L1| + |L2|.
-// Certificate (1) demands more than kSeparationMargin |n| S, 128 u: the rest pays for the rounding of the bound itself.
-// n is scaled to max-norm 1, so underflow costs at most 2^-536, far below u S for any S a float can make. The world
-// positions t1, t2 enter by their difference only: bodies far from the origin lose nothing.
+// Certificate (1) demands more than kSeparationMargin |n| S, 256 u: the rest pays for the rounding of the bound itself,
+// and leaves room for bodies whose positions are wrong by the 75 u S above (inside.hpp). n is scaled to max-norm 1, so
+// underflow costs at most 2^-536, far below u S for any S a float can make. The world positions t1, t2 enter by their
+// difference only: bodies far from the origin lose nothing.
 //
 // Certificate (2), with Q scaled to trace 1 (units cannot underflow): |dQ| <= 160 u, |d adj| <= 490 u,
 // |dn| <= 570 u S, |d det| <= 653 u, |da| <= 651 u S |L|. It is tightened by kOverlapMargin, 1024 u, times the same.
@@ -42,7 +43,7 @@
 
 namespace prolate::query {
 
-inline constexpr double kSeparationMargin = 0x1p-46;
+inline constexpr double kSeparationMargin = 0x1p-45;
 inline constexpr double kOverlapMargin = 0x1p-43;
 inline constexpr uint32_t kMaxEvaluations = 16;
 

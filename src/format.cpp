@@ -13,6 +13,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 namespace prolate {
 namespace {
@@ -47,10 +48,15 @@ enum HeaderOffset : size_t {
     kAtEllipsoids = 100,
     kAtSeed = 104,
     kAtResolution = 112,
-    kAtReserved2 = 116,
-    kHeaderBytes = 128,
+    kAtVertexCount = 116,
+    kAtTriangleCount = 120,
+    kAtComponentCount = 124,
+    kAtDiagonal = 128,
+    kAtSolidVolumeError = 136,
+    kAtReserved2 = 140,
+    kHeaderBytes = 144,
 };
-constexpr uint32_t kFlagSurfaceMode = 1;
+enum Flag : uint32_t { kSurfaceMode = 1, kExact = 2, kProved = 4, kGoalMissed = 8, kAllFlags = 15 };
 
 // A row of the levels table, which follows the header.
 enum LevelOffset : size_t {
@@ -58,10 +64,16 @@ enum LevelOffset : size_t {
     kLevelNodeCount = 4,
     kLevelEndByte = 8,
     kLevelHash = 16,
-    kLevelOutsideRatio = 24,
-    kLevelSurfaceError = 28,
-    kLevelBytes = 32,
+    kLevelUnionVolume = 24,
+    kLevelFigures = 32, // kFigures, in their order
+    kLevelBytes = 60,
 };
+constexpr double LevelFigures::*kFigures[] = {
+    &LevelFigures::outside_ratio, &LevelFigures::outside_ratio_error, &LevelFigures::sum_outside_ratio,
+    &LevelFigures::surface_error, &LevelFigures::hausdorff_max,       &LevelFigures::hausdorff_mean,
+    &LevelFigures::hausdorff_p99,
+};
+static_assert(kLevelFigures + sizeof(float) * std::size(kFigures) == kLevelBytes);
 
 // A node.
 enum NodeOffset : size_t {
@@ -73,6 +85,20 @@ enum NodeOffset : size_t {
     kNodeChildCount = 23,
 };
 static_assert(kNodeChildCount + 1 == kNodeBytes, "a change of the node layout needs a new format version");
+constexpr uint8_t kTriangleLeaf = 0x80; // this bit of the child count marks a count of triangles instead
+static_assert(kMaxDegree < kTriangleLeaf && kMaxLeafTriangles < kTriangleLeaf);
+
+// The triangle section of an exact tree, which follows the nodes: hash, vertices, indices.
+constexpr size_t kSectionHashBytes = 8, kVertexBytes = 12;
+
+// Bytes of a vertex index.
+constexpr size_t index_bytes(uint32_t vertex_count) {
+    return vertex_count <= 0x10000 ? 2 : 4;
+}
+
+uint64_t section_bytes(uint32_t vertices, uint32_t triangles) {
+    return kSectionHashBytes + uint64_t{vertices} * kVertexBytes + uint64_t{triangles} * 3 * index_bytes(vertices);
+}
 
 // Also guards against a reader of 32-bit size_t: files stay below 2^32 nodes * 24 bytes in 64-bit arithmetic.
 uint64_t end_of_nodes(uint32_t level_count, uint64_t nodes) {
@@ -107,7 +133,8 @@ format::PackedNode load_node(const std::byte* from) {
         node.off_diagonal[i] = load_le<int16_t>(from + kNodeOffDiagonal + 2 * i);
     }
     node.exponent = load_le<int8_t>(from + kNodeExponent);
-    node.child_count = load_le<uint8_t>(from + kNodeChildCount);
+    const auto count = load_le<uint8_t>(from + kNodeChildCount);
+    (count & kTriangleLeaf ? node.triangle_count : node.child_count) = count & ~kTriangleLeaf;
     return node;
 }
 
@@ -119,7 +146,8 @@ void store_node(std::byte* to, const format::PackedNode& node) {
         store_le(to + kNodeOffDiagonal + 2 * i, node.off_diagonal[i]);
     }
     store_le(to + kNodeExponent, node.exponent);
-    store_le(to + kNodeChildCount, node.child_count);
+    const unsigned count = node.triangle_count ? kTriangleLeaf | node.triangle_count : node.child_count;
+    store_le(to + kNodeChildCount, static_cast<uint8_t>(count));
 }
 
 // The header on its own: everything that does not need the nodes.
@@ -132,10 +160,12 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     const uint16_t version = load_le<uint16_t>(h + kAtVersion);
     if (version > kFormatVersion)
         return Error{ErrorCode::newer_version, "written by a newer format version than this library reads", version};
-    if (version != kFormatVersion) return bad("unknown format version", kAtVersion);
+    if (version == 0) return bad("unknown format version", kAtVersion);
+    if (version < kFormatVersion) return bad("written by an older format version than this library reads", kAtVersion);
     if (bytes.size() < kHeaderBytes) return bad("the file ends inside its header", bytes.size());
     if (load_le<uint16_t>(h + kAtHeaderSize) != kHeaderBytes) return bad("wrong header size", kAtHeaderSize);
-    if ((load_le<uint32_t>(h + kAtFlags) & ~kFlagSurfaceMode) != 0) return bad("unknown flag", kAtFlags);
+    const uint32_t flags = load_le<uint32_t>(h + kAtFlags);
+    if ((flags & ~uint32_t{kAllFlags}) != 0) return bad("unknown flag", kAtFlags);
     const uint32_t levels = load_le<uint16_t>(h + kAtLevelCount);
     if (levels < 1 || levels > kMaxLevels) return bad("level count out of range", kAtLevelCount);
     const uint32_t degree = load_le<uint16_t>(h + kAtDegree);
@@ -159,9 +189,38 @@ Result<void> check_header(std::span<const std::byte> bytes) {
         if (!std::isfinite(load_le<float>(h + at)) || load_le<float>(h + at) < 0) return bad("option out of range", at);
     if (!all_zero(h + kAtReserved0, 2)) return bad("reserved bytes are not zero", kAtReserved0);
     if (!all_zero(h + kAtReserved1, 1)) return bad("reserved bytes are not zero", kAtReserved1);
+    if (!is_metric(load_le<double>(h + kAtDiagonal))) return bad("diagonal out of range", kAtDiagonal);
+    if (!is_metric(load_le<float>(h + kAtSolidVolumeError)))
+        return bad("solid volume error out of range", kAtSolidVolumeError);
     if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
         return bad("reserved bytes are not zero", kAtReserved2);
+    if (!(flags & kExact)) {
+        if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
+            return bad("triangle counts of a tree without triangles", kAtVertexCount);
+        return {};
+    }
+    const uint32_t vertices = load_le<uint32_t>(h + kAtVertexCount);
+    if (vertices == 0) return bad("an exact tree without vertices", kAtVertexCount);
+    if (load_le<uint32_t>(h + kAtTriangleCount) == 0) return bad("an exact tree without triangles", kAtTriangleCount);
+    const uint32_t components = load_le<uint32_t>(h + kAtComponentCount);
+    if (components == 0 || components > vertices) return bad("component count out of range", kAtComponentCount);
     return {};
+}
+
+void store_section(std::span<std::byte> section, const format::PackedTriangles& triangles) {
+    std::byte* to = section.data() + kSectionHashBytes;
+    for (const Vec3& v : triangles.vertices)
+        for (const float coordinate : {v.x, v.y, v.z}) store_le(to, coordinate), to += sizeof coordinate;
+    const size_t width = index_bytes(static_cast<uint32_t>(triangles.vertices.size()));
+    for (const Triangle& t : triangles.triangles)
+        for (const uint32_t corner : t) {
+            if (width == 2)
+                store_le(to, static_cast<uint16_t>(corner));
+            else
+                store_le(to, corner);
+            to += width;
+        }
+    store_le(section.data(), hash_bytes(section.subspan(kSectionHashBytes)));
 }
 
 } // namespace
@@ -226,19 +285,23 @@ Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept {
 }
 
 std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
-                              std::span<const PackedLevel> levels) {
+                              std::span<const PackedLevel> levels, const PackedTriangles& triangles) {
     assert(!levels.empty() && levels.size() <= kMaxLevels && levels[0].nodes.size() == 1);
     const auto level_count = static_cast<uint32_t>(levels.size());
     uint64_t node_count = 0;
     for (const PackedLevel& level : levels) node_count += level.nodes.size();
     const size_t table_end = kHeaderBytes + level_count * kLevelBytes;
-    std::vector<std::byte> bytes(end_of_nodes(level_count, node_count));
+    const uint64_t nodes_end = end_of_nodes(level_count, node_count);
+    const auto vertex_count = static_cast<uint32_t>(triangles.vertices.size());
+    const auto triangle_count = static_cast<uint32_t>(triangles.triangles.size());
+    std::vector<std::byte> bytes(nodes_end + (info.exact ? section_bytes(vertex_count, triangle_count) : 0));
     std::byte* const h = bytes.data();
 
     std::memcpy(h + kAtMagic, kMagic, sizeof kMagic);
     store_le(h + kAtVersion, kFormatVersion);
     store_le(h + kAtHeaderSize, static_cast<uint16_t>(kHeaderBytes));
-    store_le(h + kAtFlags, info.surface_mode ? kFlagSurfaceMode : 0);
+    store_le(h + kAtFlags, (info.surface_mode ? kSurfaceMode : 0u) | (info.exact ? kExact : 0u) |
+                               (info.proved ? kProved : 0u) | (info.goal_reached ? 0u : kGoalMissed));
     store_le(h + kAtTotalSize, uint64_t{bytes.size()});
     store_le(h + kAtSourceHash, info.source_hash);
     store_le(h + kAtOptionsHash, info.options_hash);
@@ -258,8 +321,16 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     store_le(h + kAtEllipsoids, info.ellipsoids);
     store_le(h + kAtSeed, info.seed);
     store_le(h + kAtResolution, info.resolution);
+    store_le(h + kAtSolidVolumeError, info.solid_volume_error);
+    store_le(h + kAtDiagonal, info.diagonal);
+    if (info.exact) {
+        store_le(h + kAtVertexCount, vertex_count);
+        store_le(h + kAtTriangleCount, triangle_count);
+        store_le(h + kAtComponentCount, triangles.components);
+        store_section({h + nodes_end, bytes.size() - nodes_end}, triangles);
+    }
 
-    uint32_t first_node = 0;
+    uint32_t first_node = 0, next_triangle = 0;
     for (uint32_t l = 0; l < level_count; ++l) {
         const PackedLevel& level = levels[l];
         const auto count = static_cast<uint32_t>(level.nodes.size());
@@ -267,8 +338,9 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         std::byte* const begin = h + table_end + size_t{first_node} * kNodeBytes;
         for (uint32_t i = 0; i < count; ++i) {
             PackedNode node = level.nodes[i];
-            node.first_child = node.child_count ? next_child : 0;
+            node.first_child = node.child_count ? next_child : node.triangle_count ? next_triangle : 0;
             next_child += node.child_count;
+            next_triangle += node.triangle_count;
             store_node(begin + size_t{i} * kNodeBytes, node);
         }
         std::byte* const row = h + kHeaderBytes + l * kLevelBytes;
@@ -276,10 +348,12 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         store_le(row + kLevelNodeCount, count);
         store_le(row + kLevelEndByte, end_of_nodes(level_count, uint64_t{first_node} + count));
         store_le(row + kLevelHash, hash_bytes({begin, size_t{count} * kNodeBytes}));
-        store_le(row + kLevelOutsideRatio, level.outside_ratio);
-        store_le(row + kLevelSurfaceError, level.surface_error);
+        store_le(row + kLevelUnionVolume, level.figures.union_volume);
+        for (size_t i = 0; i < std::size(kFigures); ++i)
+            store_le(row + kLevelFigures + sizeof(float) * i, static_cast<float>(level.figures.*kFigures[i]));
         first_node += count;
     }
+    assert(next_triangle == triangle_count);
     store_le(h + kAtHeaderHash, header_hash({h, table_end}));
     return bytes;
 }
@@ -308,18 +382,23 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         if (nodes > UINT32_MAX) return bad("too many nodes", at + kLevelNodeCount);
         if (load_le<uint64_t>(h + at + kLevelEndByte) != end_of_nodes(level_count, nodes))
             return bad("wrong byte count of a level", at + kLevelEndByte);
-        if (!is_metric(load_le<float>(h + at + kLevelOutsideRatio)) ||
-            !is_metric(load_le<float>(h + at + kLevelSurfaceError)))
-            return bad("level figures out of range", at + kLevelOutsideRatio);
+        bool sound = is_metric(load_le<double>(h + at + kLevelUnionVolume));
+        for (size_t i = kLevelFigures; i < kLevelBytes; i += sizeof(float))
+            sound = sound && is_metric(load_le<float>(h + at + i));
+        if (!sound) return bad("level figures out of range", at + kLevelUnionVolume);
         if (end_of_nodes(level_count, nodes) <= bytes.size()) present = l + 1;
     }
     if (load_le<uint32_t>(h + kAtNodeCount) != nodes) return bad("wrong node count", kAtNodeCount);
-    if (load_le<uint64_t>(h + kAtTotalSize) != end_of_nodes(level_count, nodes))
-        return bad("wrong total size", kAtTotalSize);
+    const bool exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0;
+    const uint32_t vertex_count = load_le<uint32_t>(h + kAtVertexCount);
+    const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
+    const uint64_t total = end_of_nodes(level_count, nodes) + (exact ? section_bytes(vertex_count, triangle_count) : 0);
+    if (load_le<uint64_t>(h + kAtTotalSize) != total) return bad("wrong total size", kAtTotalSize);
     if (present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
     const uint64_t present_end = load_le<uint64_t>(h + kHeaderBytes + (present - 1) * kLevelBytes + kLevelEndByte);
-    if (present_end != bytes.size())
-        return present == level_count ? bad("bytes follow the end of the tree", present_end)
+    if (bytes.size() > total) return bad("bytes follow the end of the tree", total);
+    if (bytes.size() != total && bytes.size() != present_end)
+        return present == level_count ? bad("the file is cut off inside its triangles", bytes.size())
                                       : bad("the file is cut off inside a level", bytes.size());
 
     // The nodes: children in breadth-first order, so that each node has one parent, before it.
@@ -327,10 +406,10 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.bytes_ = bytes;
     view.nodes_ = h + table_end;
     view.level_count_ = present;
-    view.is_prefix_ = present < level_count;
+    view.is_prefix_ = bytes.size() < total;
     for (size_t i = 0; i < 3; ++i) view.origin_[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
     view.step_exponent_ = load_le<int16_t>(h + kAtStepExponent);
-    uint64_t next_child = 1;
+    uint64_t next_child = 1, next_triangle = 0;
     for (uint32_t l = 0; l < present; ++l) {
         const LevelInfo level = view.level(l);
         view.node_count_ = level.first_node + level.node_count;
@@ -343,9 +422,13 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
             const size_t at = begin_byte + size_t{i} * kNodeBytes;
             const format::PackedNode node = load_node(h + at);
             if (node.child_count > degree) return bad("a node has more children than the degree", at + kNodeChildCount);
-            if (node.first_child != (node.child_count ? next_child : 0))
-                return bad("children are not in breadth-first order", at + kNodeFirstChild);
+            const bool marked = (load_le<uint8_t>(h + at + kNodeChildCount) & kTriangleLeaf) != 0;
+            if (marked != (exact && node.child_count == 0) || marked != (node.triangle_count > 0))
+                return bad("a leaf has no triangles, or some in a tree without", at + kNodeChildCount);
+            if (node.first_child != (node.child_count ? next_child : next_triangle))
+                return bad("children or triangles are not in breadth-first order", at + kNodeFirstChild);
             next_child += node.child_count;
+            next_triangle += node.triangle_count;
             if (node.exponent < format::kMinNodeExponent || node.exponent > format::kMaxNodeExponent)
                 return bad("node size out of range", at + kNodeExponent);
             for (size_t k = 0; k < 3; ++k)
@@ -356,6 +439,28 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         if (next_child != uint64_t{view.node_count_} + next_count)
             return bad("the children of a level are not the next level", begin_byte);
     }
+    if (next_triangle > triangle_count || (present == level_count && next_triangle != triangle_count))
+        return bad("the leaves do not share out the triangles", kAtTriangleCount);
+    if (!exact || view.is_prefix_) return view;
+
+    const size_t section = present_end, vertices = section + kSectionHashBytes;
+    if (options.check_hash && hash_bytes(bytes.subspan(vertices)) != load_le<uint64_t>(h + section))
+        return bad("the triangles are damaged (hash mismatch)", section);
+    view.vertices_ = h + vertices;
+    view.triangles_ = view.vertices_ + size_t{vertex_count} * kVertexBytes;
+    view.vertex_count_ = vertex_count;
+    view.triangle_count_ = triangle_count;
+    view.component_count_ = load_le<uint32_t>(h + kAtComponentCount);
+    for (uint32_t v = 0; v < vertex_count; ++v) {
+        const Vec3 p = view.vertex(v);
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            return bad("a vertex is not finite", vertices + size_t{v} * kVertexBytes);
+    }
+    for (uint32_t t = 0; t < triangle_count; ++t)
+        for (const uint32_t corner : view.triangle(t))
+            if (corner >= vertex_count)
+                return bad("a triangle names a vertex that does not exist",
+                           static_cast<size_t>(view.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count));
     return view;
 }
 
@@ -366,19 +471,27 @@ uint32_t TreeView::degree() const noexcept {
 LevelInfo TreeView::level(uint32_t l) const noexcept {
     assert(l < level_count_);
     const std::byte* const row = bytes_.data() + kHeaderBytes + l * kLevelBytes;
-    return {.first_node = load_le<uint32_t>(row + kLevelFirstNode),
-            .node_count = load_le<uint32_t>(row + kLevelNodeCount),
-            .end_byte = load_le<uint64_t>(row + kLevelEndByte),
-            .outside_ratio = load_le<float>(row + kLevelOutsideRatio),
-            .surface_error = load_le<float>(row + kLevelSurfaceError)};
+    LevelInfo level;
+    level.first_node = load_le<uint32_t>(row + kLevelFirstNode);
+    level.node_count = load_le<uint32_t>(row + kLevelNodeCount);
+    level.end_byte = load_le<uint64_t>(row + kLevelEndByte);
+    level.union_volume = load_le<double>(row + kLevelUnionVolume);
+    for (size_t i = 0; i < std::size(kFigures); ++i)
+        level.*kFigures[i] = load_le<float>(row + kLevelFigures + sizeof(float) * i);
+    return level;
 }
 
 BakeInfo TreeView::bake_info() const noexcept {
     const std::byte* const h = bytes_.data();
     return {.source_hash = load_le<uint64_t>(h + kAtSourceHash),
             .options_hash = load_le<uint64_t>(h + kAtOptionsHash),
-            .surface_mode = (load_le<uint32_t>(h + kAtFlags) & kFlagSurfaceMode) != 0,
+            .surface_mode = (load_le<uint32_t>(h + kAtFlags) & kSurfaceMode) != 0,
+            .exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0,
+            .proved = (load_le<uint32_t>(h + kAtFlags) & kProved) != 0,
+            .goal_reached = (load_le<uint32_t>(h + kAtFlags) & kGoalMissed) == 0,
             .solid_volume = load_le<double>(h + kAtSolidVolume),
+            .solid_volume_error = load_le<float>(h + kAtSolidVolumeError),
+            .diagonal = load_le<double>(h + kAtDiagonal),
             .method = static_cast<Method>(load_le<uint8_t>(h + kAtMethod)),
             .primitive = static_cast<Primitive>(load_le<uint8_t>(h + kAtPrimitive)),
             .quality = static_cast<Quality>(load_le<uint8_t>(h + kAtQuality)),
@@ -401,7 +514,31 @@ ChildRange TreeView::children(uint32_t node) const noexcept {
     assert(node < node_count_);
     const std::byte* const from = nodes_ + size_t{node} * kNodeBytes;
     const ChildRange range{load_le<uint32_t>(from + kNodeFirstChild), load_le<uint8_t>(from + kNodeChildCount)};
-    return range.first < node_count_ ? range : ChildRange{};
+    return range.first < node_count_ && range.count < kTriangleLeaf ? range : ChildRange{};
+}
+
+TriangleRange TreeView::triangles(uint32_t node) const noexcept {
+    assert(node < node_count_);
+    const std::byte* const from = nodes_ + size_t{node} * kNodeBytes;
+    const auto count = load_le<uint8_t>(from + kNodeChildCount);
+    if (!has_triangles() || count < kTriangleLeaf) return {};
+    return {load_le<uint32_t>(from + kNodeFirstChild), uint32_t{count} - kTriangleLeaf};
+}
+
+Triangle TreeView::triangle(uint32_t t) const noexcept {
+    assert(t < triangle_count_);
+    if (index_bytes(vertex_count_) == 2) {
+        const std::byte* const from = triangles_ + size_t{t} * 6;
+        return {load_le<uint16_t>(from), load_le<uint16_t>(from + 2), load_le<uint16_t>(from + 4)};
+    }
+    const std::byte* const from = triangles_ + size_t{t} * 12;
+    return {load_le<uint32_t>(from), load_le<uint32_t>(from + 4), load_le<uint32_t>(from + 8)};
+}
+
+Vec3 TreeView::vertex(uint32_t v) const noexcept {
+    assert(v < vertex_count_);
+    const std::byte* const from = vertices_ + size_t{v} * kVertexBytes;
+    return {load_le<float>(from), load_le<float>(from + 4), load_le<float>(from + 8)};
 }
 
 } // namespace prolate

@@ -33,6 +33,7 @@ struct PackedNode {
     int16_t off_diagonal[3] = {};     // l21, l31, l32
     int8_t exponent = 0;
     uint8_t child_count = 0;
+    uint8_t triangle_count = 0; // of a leaf of an exact tree; first_child is then its first triangle
 };
 
 /// Lattice for centers inside the box [low, high], all finite: the finest step for which 16 bits reach across and a
@@ -49,13 +50,19 @@ Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept;
 /// One level to be written.
 struct PackedLevel {
     std::vector<PackedNode> nodes; ///< in order; children of earlier nodes first; first_child is filled by encode()
-    float outside_ratio = 0;
-    float surface_error = 0;
+    LevelFigures figures = {};
 };
 
-/// The bytes of a whole file. Sets first_child from the child counts. The caller keeps the invariants of FORMAT.md
-/// (counts that add up, degree and level limits).
+/// The triangles of an exact tree, in the order of its leaves.
+struct PackedTriangles {
+    std::span<const Vec3> vertices; ///< the first `components` are one of each connected part
+    std::span<const Triangle> triangles;
+    uint32_t components = 0;
+};
+
+/// The bytes of a whole file; `triangles` are written if info.exact. Sets first_child from the counts of children and
+/// triangles. The caller keeps the invariants of FORMAT.md (counts that add up, degree and level limits).
 std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
-                              std::span<const PackedLevel> levels);
+                              std::span<const PackedLevel> levels, const PackedTriangles& triangles = {});
 
 } // namespace prolate::format

@@ -36,7 +36,7 @@ using scenes::Random;
 using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
-constexpr size_t kTable = 128, kRow = 32, kNodes = kTable + 3 * kRow; // of the golden tree
+constexpr size_t kTable = 144, kRow = 60, kNodes = kTable + 3 * kRow; // of the golden tree
 constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
 
 std::vector<PackedLevel> golden_levels() {
@@ -46,28 +46,34 @@ std::vector<PackedLevel> golden_levels() {
                    .off_diagonal = {-1000, 2000, -3000},
                    .exponent = 1,
                    .child_count = 2}},
-                 2.5f,
-                 0.75f};
+                 {2.5, 0.125, 2.5, 43.75, 0.75, 0.625, 0.25, 0.5}};
     levels[1] = {{{.center = {0, 0, 0},
                    .diagonal = {1, 2, 65535},
                    .off_diagonal = {32767, -32768, 0},
                    .exponent = 0,
                    .child_count = 3},
                   {.center = {65535, 1, 2}, .diagonal = {300, 200, 100}, .exponent = -7}},
-                 1.25f,
-                 0.5f};
+                 {1.25, 0.0625, 1.5, 28.125, 0.5, 0.375, 0.125, 0.3125}};
     levels[2] = {{{.center = {1, 2, 3}, .diagonal = {33000, 34000, 35000}, .exponent = -3},
                   {.center = {4, 5, 6}, .diagonal = {36000, 37000, 38000}, .exponent = -4},
                   {.center = {7, 8, 9}, .diagonal = {39000, 40000, 41000}, .exponent = -5}},
-                 std::numeric_limits<float>::quiet_NaN(),
-                 0.25f};
+                 {.union_volume = 1e300, .surface_error = 0.25}};
     return levels;
 }
+// The same tree with triangles in its leaves: a tetrahedron, and one triangle apart from it.
+constexpr Vec3 kGoldenVertices[] = {{0, 0, 0}, {5, 5, 5}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {6, 5, 5}, {5, 6, 5}};
+constexpr Triangle kGoldenTriangles[] = {{1, 5, 6}, {0, 3, 2}, {0, 2, 4}, {0, 4, 3}, {2, 3, 4}};
+constexpr uint8_t kGoldenLeaves[] = {1, 2, 1, 1}; // triangles of nodes 2 ... 5
+
 BakeInfo golden_info() {
     return {.source_hash = 0x0123456789abcdefu,
             .options_hash = 0xfedcba9876543210u,
             .surface_mode = true,
+            .proved = true,
+            .goal_reached = false,
             .solid_volume = 12.5,
+            .solid_volume_error = 0.03125f,
+            .diagonal = 17.25,
             .method = Method::analytic,
             .primitive = Primitive::ellipsoid,
             .quality = Quality::best,
@@ -81,6 +87,14 @@ BakeInfo golden_info() {
 }
 Bytes golden() {
     return format::encode(golden_info(), 3, kGoldenLattice, golden_levels());
+}
+Bytes golden_exact() {
+    BakeInfo info = golden_info();
+    info.exact = true;
+    auto levels = golden_levels();
+    levels[1].nodes[1].triangle_count = kGoldenLeaves[0];
+    for (size_t i = 0; i < 3; ++i) levels[2].nodes[i].triangle_count = kGoldenLeaves[i + 1];
+    return format::encode(info, 3, kGoldenLattice, levels, {kGoldenVertices, kGoldenTriangles, 2});
 }
 
 Bytes read(const fs::path& path) {
@@ -118,31 +132,85 @@ void expect_sound(const TreeView& tree) {
         const LevelInfo level = tree.level(l);
         ASSERT_EQ(level.first_node, nodes);
         nodes += level.node_count;
-        ASSERT_TRUE(std::isnan(level.outside_ratio) ||
-                    (std::isfinite(level.outside_ratio) && level.outside_ratio >= 0));
-        ASSERT_TRUE(std::isnan(level.surface_error) ||
-                    (std::isfinite(level.surface_error) && level.surface_error >= 0));
+        for (const double figure :
+             {level.outside_ratio, level.outside_ratio_error, level.sum_outside_ratio, level.union_volume,
+              level.surface_error, level.hausdorff_max, level.hausdorff_mean, level.hausdorff_p99})
+            ASSERT_TRUE(std::isnan(figure) || (std::isfinite(figure) && figure >= 0));
         ASSERT_EQ(level.end_byte <= tree.bytes().size(), true);
     }
     ASSERT_EQ(nodes, tree.node_count());
-    uint32_t next = 1;
+    const BakeInfo info = tree.bake_info();
+    ASSERT_EQ(tree.has_triangles(), info.exact && !tree.is_prefix());
+    uint32_t next = 1, next_triangle = 0;
     for (uint32_t n = 0; n < nodes; ++n) {
         expect_finite(tree.ellipsoid(n));
         const ChildRange children = tree.children(n);
+        const TriangleRange triangles = tree.triangles(n);
         ASSERT_LE(children.count, tree.degree());
+        ASSERT_LE(triangles.count, kMaxLeafTriangles);
+        ASSERT_EQ(triangles.count > 0, tree.has_triangles() && children.count == 0);
+        if (triangles.count > 0) {
+            ASSERT_EQ(triangles.first, next_triangle);
+            next_triangle += triangles.count;
+        }
         if (children.count == 0) continue;
         ASSERT_EQ(children.first, next);
         next += children.count;
     }
     ASSERT_EQ(next, nodes);
-    const BakeInfo info = tree.bake_info();
+    ASSERT_EQ(next_triangle, tree.triangle_count());
+    ASSERT_LE(tree.component_count(), tree.vertex_count());
+    for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
+        const Vec3 p = tree.vertex(v);
+        ASSERT_TRUE(std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z));
+    }
+    for (uint32_t t = 0; t < tree.triangle_count(); ++t)
+        for (const uint32_t corner : tree.triangle(t)) ASSERT_LT(corner, tree.vertex_count());
     ASSERT_TRUE(std::isfinite(info.alpha) && std::isfinite(info.beta) && std::isfinite(info.tolerance));
     ASSERT_TRUE(info.method <= Method::analytic && info.primitive <= Primitive::sphere &&
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenFileOfVersionOne) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v1.etree");
+TEST(Format, GoldenExactFileOfVersionTwo) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v2_exact.etree");
+    ASSERT_EQ(file.size(), kNodes + 6 * kNodeBytes + 8 + 7 * 12 + 5 * 6);
+    EXPECT_EQ(golden_exact(), file);
+    const auto tree = TreeView::open(file);
+    ASSERT_TRUE(tree) << tree.error().what;
+    expect_sound(*tree);
+    EXPECT_TRUE(tree->has_triangles() && tree->bake_info().exact && !tree->is_prefix());
+    EXPECT_EQ(tree->component_count(), 2u);
+    ASSERT_EQ(tree->vertex_count(), std::size(kGoldenVertices));
+    for (uint32_t v = 0; v < tree->vertex_count(); ++v) EXPECT_EQ(tree->vertex(v), kGoldenVertices[v]);
+    ASSERT_EQ(tree->triangle_count(), std::size(kGoldenTriangles));
+    for (uint32_t t = 0; t < tree->triangle_count(); ++t) EXPECT_EQ(tree->triangle(t), kGoldenTriangles[t]);
+    EXPECT_EQ(tree->triangles(0).count, 0u);
+    for (uint32_t leaf = 2; leaf < 6; ++leaf) {
+        EXPECT_TRUE(tree->is_leaf(leaf));
+        EXPECT_EQ(tree->triangles(leaf).count, kGoldenLeaves[leaf - 2]);
+    }
+    EXPECT_EQ(tree->triangles(4).first, 3u);
+}
+
+TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
+    for (const uint32_t count : {65536u, 65537u}) {
+        std::vector<Vec3> vertices(count);
+        for (uint32_t v = 0; v < count; ++v) vertices[v].x = static_cast<float>(v);
+        const Triangle triangle{count - 1, 0, 1};
+        BakeInfo info;
+        info.exact = true;
+        PackedLevel root{{{.triangle_count = 1}}};
+        const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
+        EXPECT_EQ(bytes.size(), kTable + kRow + kNodeBytes + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        const auto tree = TreeView::open(bytes);
+        ASSERT_TRUE(tree) << tree.error().what;
+        EXPECT_EQ(tree->triangle(0), triangle);
+        EXPECT_EQ(tree->vertex(count - 1).x, static_cast<float>(count - 1));
+    }
+}
+
+TEST(Format, GoldenFileOfVersionTwo) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v2.etree");
     ASSERT_EQ(file.size(), kNodes + 6 * kNodeBytes);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -172,13 +240,27 @@ TEST(Format, GoldenFileOfVersionOne) {
     EXPECT_EQ(tree->children(1).count, 3u);
     EXPECT_TRUE(tree->is_leaf(2));
     EXPECT_EQ(tree->level(1).end_byte, kNodes + 3 * kNodeBytes);
-    EXPECT_EQ(tree->level(1).outside_ratio, 1.25f);
+    const LevelInfo level = tree->level(1);
+    EXPECT_EQ(level.outside_ratio, 1.25);
+    EXPECT_EQ(level.outside_ratio_error, 0.0625);
+    EXPECT_EQ(level.sum_outside_ratio, 1.5);
+    EXPECT_EQ(level.union_volume, 28.125);
+    EXPECT_EQ(level.surface_error, 0.5);
+    EXPECT_EQ(level.hausdorff_max, 0.375);
+    EXPECT_EQ(level.hausdorff_mean, 0.125);
+    EXPECT_EQ(level.hausdorff_p99, 0.3125);
     EXPECT_TRUE(std::isnan(tree->level(2).outside_ratio));
+    EXPECT_TRUE(std::isnan(tree->level(2).hausdorff_p99));
+    EXPECT_EQ(tree->level(2).union_volume, 1e300);
     const BakeInfo info = tree->bake_info(), expected = golden_info();
     EXPECT_EQ(info.source_hash, expected.source_hash);
     EXPECT_EQ(info.options_hash, expected.options_hash);
     EXPECT_EQ(info.surface_mode, expected.surface_mode);
+    EXPECT_EQ(info.proved, expected.proved);
+    EXPECT_EQ(info.goal_reached, expected.goal_reached);
     EXPECT_EQ(info.solid_volume, expected.solid_volume);
+    EXPECT_EQ(info.solid_volume_error, expected.solid_volume_error);
+    EXPECT_EQ(info.diagonal, expected.diagonal);
     EXPECT_EQ(info.method, expected.method);
     EXPECT_EQ(info.quality, expected.quality);
     EXPECT_EQ(info.alpha, expected.alpha);
@@ -188,6 +270,30 @@ TEST(Format, GoldenFileOfVersionOne) {
     EXPECT_EQ(info.ellipsoids, expected.ellipsoids);
     EXPECT_EQ(info.seed, expected.seed);
     EXPECT_EQ(info.resolution, expected.resolution);
+}
+
+TEST(Format, FlagsDecodeByThemselves) {
+    for (const unsigned flags : {0u, 1u, 4u, 5u, 8u, 9u, 12u, 13u}) {
+        BakeInfo info = golden_info();
+        info.surface_mode = flags & 1, info.proved = flags & 4, info.goal_reached = !(flags & 8);
+        const Bytes bytes = format::encode(info, 3, kGoldenLattice, golden_levels());
+        EXPECT_EQ(bytes[12], std::byte(flags));
+        const BakeInfo read_back = TreeView::open(bytes)->bake_info();
+        EXPECT_EQ(read_back.surface_mode, info.surface_mode);
+        EXPECT_EQ(read_back.proved, info.proved);
+        EXPECT_EQ(read_back.goal_reached, info.goal_reached);
+    }
+}
+
+TEST(Format, OlderVersionsAreRefusedInWords) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v1.etree");
+    ASSERT_FALSE(file.empty());
+    for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
+        const auto tree = TreeView::open(file, options);
+        ASSERT_FALSE(tree);
+        EXPECT_EQ(tree.error().code, ErrorCode::bad_file);
+        EXPECT_STREQ(tree.error().what, "written by an older format version than this library reads");
+    }
 }
 
 TEST(Format, CutsTakeLeavesFromAbove) {
@@ -203,13 +309,15 @@ TEST(Format, CutsTakeLeavesFromAbove) {
     EXPECT_EQ(cut(2), (std::vector<uint32_t>{2, 3, 4, 5}));
 }
 
-TEST(Format, EveryPrefixIsRefusedUnlessALevelEndsThere) {
-    const Bytes bytes = golden();
+void expect_prefixes(const Bytes& bytes) {
     for (const OpenOptions& options : {OpenOptions{}, kNoHash})
         for (size_t n = 0; n < bytes.size(); ++n) {
             const Exact part({bytes.data(), n});
             const auto tree = TreeView::open(part.bytes(), options);
-            const uint32_t levels = n == kNodes + kNodeBytes ? 1 : n == kNodes + 3 * kNodeBytes ? 2 : 0;
+            const uint32_t levels = n == kNodes + kNodeBytes       ? 1
+                                    : n == kNodes + 3 * kNodeBytes ? 2
+                                    : n == kNodes + 6 * kNodeBytes ? 3 // without the triangles
+                                                                   : 0;
             ASSERT_EQ(tree.has_value(), levels > 0) << n;
             if (!tree) {
                 ASSERT_EQ(tree.error().code, ErrorCode::bad_file) << n;
@@ -225,9 +333,12 @@ TEST(Format, EveryPrefixIsRefusedUnlessALevelEndsThere) {
     EXPECT_FALSE(TreeView::open(longer, kNoHash));
     EXPECT_FALSE(TreeView::open({}));
 }
+TEST(Format, EveryPrefixIsRefusedUnlessALevelEndsThere) {
+    expect_prefixes(golden());
+    expect_prefixes(golden_exact());
+}
 
-TEST(Format, EverySingleByteChangeIsFound) {
-    Bytes bytes = golden();
+void expect_changes_found(Bytes bytes) {
     for (size_t at = 0; at < bytes.size(); ++at)
         for (unsigned flip = 1; flip < 256; ++flip) {
             bytes[at] ^= std::byte(flip);
@@ -236,9 +347,12 @@ TEST(Format, EverySingleByteChangeIsFound) {
         }
     EXPECT_TRUE(TreeView::open(bytes));
 }
+TEST(Format, EverySingleByteChangeIsFound) {
+    expect_changes_found(golden());
+    expect_changes_found(golden_exact());
+}
 
-TEST(Format, WithoutHashesEveryChangeIsRefusedOrSound) {
-    const Bytes bytes = golden();
+void expect_refused_or_sound(const Bytes& bytes) {
     const Exact copy(bytes);
     uint32_t accepted = 0, refused = 0;
     for (size_t at = 0; at < bytes.size(); ++at)
@@ -246,12 +360,16 @@ TEST(Format, WithoutHashesEveryChangeIsRefusedOrSound) {
             copy.data[at] ^= std::byte(flip);
             const auto tree = TreeView::open(copy.bytes(), kNoHash);
             if (tree) expect_sound(*tree);
-            if (HasFatalFailure()) FAIL() << "byte " << at << " xor " << flip;
+            if (testing::Test::HasFatalFailure()) FAIL() << "byte " << at << " xor " << flip;
             ++(tree ? accepted : refused);
             copy.data[at] ^= std::byte(flip);
         }
     EXPECT_GT(accepted, 10'000u);
     EXPECT_GT(refused, 10'000u);
+}
+TEST(Format, WithoutHashesEveryChangeIsRefusedOrSound) {
+    expect_refused_or_sound(golden());
+    expect_refused_or_sound(golden_exact());
 }
 
 TEST(Format, NamesTheFirstOffence) {
@@ -261,14 +379,15 @@ TEST(Format, NamesTheFirstOffence) {
         ErrorCode code;
         uint64_t where;
     };
-    const size_t node1 = kNodes + kNodeBytes;
+    const size_t node1 = kNodes + kNodeBytes, node2 = node1 + kNodeBytes, section = kNodes + 6 * kNodeBytes;
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
-        {8, {2}, ErrorCode::newer_version, 2},
+        {8, {1}, ErrorCode::bad_file, 8},
+        {8, {3}, ErrorCode::newer_version, 3},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
-        {10, {129}, ErrorCode::bad_file, 10},
-        {12, {3}, ErrorCode::bad_file, 12},  // unknown flag
+        {10, {128}, ErrorCode::bad_file, 10},
+        {12, {16}, ErrorCode::bad_file, 12}, // unknown flag
         {16, {0}, ErrorCode::bad_file, 16},  // total size
         {48, {7}, ErrorCode::bad_file, 48},  // node count
         {52, {0}, ErrorCode::bad_file, 52},  // no level
@@ -285,27 +404,51 @@ TEST(Format, NamesTheFirstOffence) {
         {83, {1}, ErrorCode::bad_file, 83},
         {84, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 84}, // alpha not a number
         {88, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 88}, // beta negative
-        {116, {1}, ErrorCode::bad_file, 116},
+        {116, {1}, ErrorCode::bad_file, 116},              // reserved
         {127, {1}, ErrorCode::bad_file, 116},
+        {12, {3}, ErrorCode::bad_file, 116},                              // exact, without triangles
+        {128, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 128},  // infinite diagonal
+        {136, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 136},              // negative error
+        {143, {1}, ErrorCode::bad_file, 140},                             // reserved
         {kTable, {1}, ErrorCode::bad_file, kTable},                       // first node of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
         {kTable + 8, {0}, ErrorCode::bad_file, kTable + 8},
-        {kTable + 27, {0xff}, ErrorCode::bad_file, kTable + 24}, // negative figure
-        {kNodes, {2}, ErrorCode::bad_file, kNodes},              // first child
-        {node1 + 23, {4}, ErrorCode::bad_file, node1 + 23},      // more children than the degree
-        {node1 + 23, {2}, ErrorCode::bad_file, node1},           // children that are not the next level
-        {node1 + 22, {101}, ErrorCode::bad_file, node1 + 22},    // exponent
-        {node1 + 10, {0, 0}, ErrorCode::bad_file, node1 + 10},   // no extent
+        {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},             // negative union volume
+        {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},             // negative outside ratio
+        {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24}, // infinite distance
+        {kNodes, {2}, ErrorCode::bad_file, kNodes},                          // first child
+        {node1 + 23, {4}, ErrorCode::bad_file, node1 + 23},                  // more children than the degree
+        {node1 + 23, {2}, ErrorCode::bad_file, node1},                       // children that are not the next level
+        {node1 + 22, {101}, ErrorCode::bad_file, node1 + 22},                // exponent
+        {node1 + 10, {0, 0}, ErrorCode::bad_file, node1 + 10},               // no extent
+        {node2 + 23, {128}, ErrorCode::bad_file, node2 + 23},                // a leaf of no triangles
+        {node2 + 23, {129}, ErrorCode::bad_file, node2 + 23},                // triangles in a tree without
     };
-    for (const Case& c : cases) {
-        Bytes bytes = golden();
+    const Case exact_cases[] = {
+        {12, {1}, ErrorCode::bad_file, 116},                          // triangle counts of a tree without
+        {116, {0}, ErrorCode::bad_file, 116},                         // no vertices
+        {116, {8}, ErrorCode::bad_file, 16},                          // more than the size says
+        {120, {0}, ErrorCode::bad_file, 120},                         // no triangles
+        {124, {0}, ErrorCode::bad_file, 124},                         // no component
+        {124, {8}, ErrorCode::bad_file, 124},                         // more than vertices
+        {node2 + 23, {0}, ErrorCode::bad_file, node2 + 23},           // a leaf of none
+        {node2 + 23, {128}, ErrorCode::bad_file, node2 + 23},         // another of none
+        {node2 + 23, {130}, ErrorCode::bad_file, node2 + kNodeBytes}, // one that the next leaf has too
+        {section - 1, {130}, ErrorCode::bad_file, 120},               // one more than there are
+        {node1 + 23, {131}, ErrorCode::bad_file, node1},              // an inner node's children as triangles
+        {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
+        {section + 8 + 7 * 12 + 2 * 6 + 4, {7}, ErrorCode::bad_file, section + 8 + 7 * 12 + 12}, // no such vertex
+    };
+    const auto check = [](const Case& c, Bytes bytes) {
         for (size_t i = 0; i < c.bytes.size(); ++i) bytes[c.at + i] = std::byte(c.bytes[i]);
         const auto tree = TreeView::open(bytes, kNoHash);
         ASSERT_FALSE(tree) << "byte " << c.at;
         EXPECT_EQ(tree.error().code, c.code) << "byte " << c.at << ": " << tree.error().what;
         EXPECT_EQ(tree.error().where, c.where) << "byte " << c.at << ": " << tree.error().what;
-    }
+    };
+    for (const Case& c : cases) check(c, golden());
+    for (const Case& c : exact_cases) check(c, golden_exact());
 }
 
 TEST(Format, DecodingIsExact) {
@@ -507,7 +650,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 1); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 2); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

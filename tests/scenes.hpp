@@ -223,8 +223,8 @@ inline Scene tree(Random& random, std::vector<Point> points, const TreeOptions& 
     std::vector<Part> parts{{0, points.size()}};
     while (!parts.empty()) {
         format::PackedLevel level;
-        level.outside_ratio = 1.0f / static_cast<float>(levels.size() + 1);
-        level.surface_error = static_cast<float>(options.unit) * level.outside_ratio;
+        level.figures.outside_ratio = 1.0 / static_cast<double>(levels.size() + 1);
+        level.figures.surface_error = options.unit * level.figures.outside_ratio;
         std::vector<Part> next;
         const bool last = levels.size() + 1 == options.levels;
         for (const Part& part : parts) {

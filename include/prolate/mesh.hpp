@@ -4,15 +4,13 @@
 #include <prolate/error.hpp>
 #include <prolate/types.hpp>
 
-#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace prolate {
-
-using Triangle = std::array<uint32_t, 3>; ///< three vertex indices
 
 /// Borrowed indexed triangles, metres. Outward orientation is counter-clockwise seen from outside.
 struct MeshView {
@@ -61,5 +59,10 @@ uint64_t hash(MeshView mesh) noexcept;
 /// Fails with io (`where` is errno) or bad_file; `detail`, if given, then receives particulars, such as the reader's
 /// own words. The mesh is not cleaned yet. Thread-safe.
 Result<Mesh> load_mesh(const char* path, std::string* detail = nullptr);
+
+/// A hash of all that load_mesh() makes the mesh of `path` from: the bytes of the file, its type, the reader's version.
+/// Equal hashes mean equal meshes, at the cost of reading the file. Empty if the file cannot be read, or if the mesh
+/// may depend on other files, too (glTF and GLB that name some). Thread-safe.
+std::optional<uint64_t> hash_mesh_file(const char* path);
 
 } // namespace prolate

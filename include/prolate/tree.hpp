@@ -4,6 +4,9 @@
 // together cover the part of the solid that the node stands for. A *cut* takes the nodes of one level, plus the leaves
 // above it; every cut covers the solid. A child need not lie inside its parent's ellipsoid.
 //
+// An *exact* tree also holds the triangles of its mesh, a few in each leaf. Its ellipsoids cover these triangles, not
+// what they enclose, and only cull; queries answer as the triangles do.
+//
 // The bytes are the object: open() checks them once, allocates nothing, and every later access is memory-safe and
 // finite whatever the bytes hold. src/FORMAT.md is the normative description.
 #pragma once
@@ -13,6 +16,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -21,6 +25,9 @@ namespace prolate {
 inline constexpr uint32_t kMaxDegree = 64; ///< children per node, at most
 inline constexpr uint32_t kMaxLevels = 32; ///< levels including the root, at most
 inline constexpr size_t kNodeBytes = 24;   ///< bytes of one node in the file
+
+/// Triangles in a leaf of an exact tree, at most.
+inline constexpr uint32_t kMaxLeafTriangles = 127;
 
 /// How E_vol was evaluated (paper, section 3.2).
 enum class Method : uint8_t { voxel = 0, analytic = 1 };
@@ -32,9 +39,14 @@ enum class Quality : uint8_t { fast = 0, normal = 1, best = 2 };
 /// What the file says of its own making.
 struct BakeInfo {
     uint64_t source_hash = 0;  ///< hash(MeshView) of the cleaned mesh
-    uint64_t options_hash = 0; ///< hash of the bake options, see hash(BuildOptions)
+    uint64_t options_hash = 0; ///< hash of the options and of the builder's version, see hash(BuildOptions)
     bool surface_mode = false; ///< true: the mesh was open, and only its triangles are guaranteed covered
+    bool exact = false;        ///< an exact tree: only the triangles are covered, and stored beside the nodes
+    bool proved = false;       ///< the cover of every level was proved, after quantisation, before the file was written
+    bool goal_reached = true;  ///< false: the asked tolerance or count could not be met
     double solid_volume = 0;   ///< volume of the solid, cubic metres; 0 where there is no inside
+    float solid_volume_error = 0; ///< of solid_volume, relative; found as LevelFigures::outside_ratio_error is
+    double diagonal = 0;          ///< of the mesh's bounding box, metres
     Method method = Method::voxel;
     Primitive primitive = Primitive::ellipsoid;
     Quality quality = Quality::normal;
@@ -46,17 +58,43 @@ struct BakeInfo {
     uint32_t resolution = 0;   ///< voxels along the longest side
 };
 
+/// How close one level's cut is to the mesh, as measured on the decoded nodes when it was baked. NaN is unknown: ratios
+/// have no meaning where the solid has no volume. Lengths in metres, volumes in cubic metres. The file rounds all but
+/// union_volume to floats.
+struct LevelFigures {
+    static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+    double outside_ratio = kUnknown; ///< volume of (union of the cut \ solid) / volume of the solid
+    /// Of outside_ratio, absolute. Lengths along z are exact, so the error is that of the quadrature over a lattice of
+    /// columns in x and y. This is how far the outside volume moves, at most, if only one of the four interleaved
+    /// lattices of twice the pitch is used, plus two of the longest columns; and the same for the solid's volume. It is
+    /// an estimate and no strict bound, but on the large side: usually several times the true error.
+    double outside_ratio_error = kUnknown;
+    double sum_outside_ratio = kUnknown; ///< sum of the single ellipsoids' outside volumes / volume of the solid
+    double union_volume = kUnknown;      ///< of the cut
+    double surface_error = kUnknown;     ///< largest E_sur of the cut (paper, eq. 1)
+    /// No point of the cover is farther from the solid (of an open mesh: from its triangles): the one-sided Hausdorff
+    /// distance, too large by at most 0.01 % of the diagonal (quality fast: 0.1 %).
+    double hausdorff_max = kUnknown;
+    double hausdorff_mean = kUnknown; ///< the same distance, on average over the cover's surface, to about 1 %
+    double hausdorff_p99 = kUnknown;  ///< 99 % of the cover's surface is at most so far from the solid
+};
+
 /// One level of the tree.
-struct LevelInfo {
+struct LevelInfo : LevelFigures {
     uint32_t first_node = 0; ///< index of its first node
     uint32_t node_count = 0; ///< nodes of this level
     uint64_t end_byte = 0;   ///< the file's first end_byte bytes are a valid tree that ends with this level
-    float outside_ratio = 0; ///< volume of (union of the cut \ solid) / volume of the solid, as baked; NaN if unknown
-    float surface_error = 0; ///< largest E_sur of the cut (paper, eq. 1), metres
 };
 
 /// Children of a node: indices first ... first + count - 1. A leaf has count 0.
 struct ChildRange {
+    uint32_t first = 0;
+    uint32_t count = 0;
+};
+
+/// Triangles of a leaf: indices first ... first + count - 1.
+struct TriangleRange {
     uint32_t first = 0;
     uint32_t count = 0;
 };
@@ -72,7 +110,7 @@ struct OpenOptions {
 class TreeView {
 public:
     /// Checks `bytes` and returns a view of them. Bytes need no alignment and may come from an untrusted source.
-    /// Accepts a whole file, or a prefix that ends exactly where a level ends (a coarser tree).
+    /// Accepts a whole file, or a prefix that ends exactly where a level ends (a coarser tree, without triangles).
     /// Fails with bad_file or newer_version; `where` is the byte offset of the first offence. Allocates nothing.
     static Result<TreeView> open(std::span<const std::byte> bytes, const OpenOptions& options = {}) noexcept;
 
@@ -94,6 +132,21 @@ public:
     ChildRange children(uint32_t node) const noexcept;
     bool is_leaf(uint32_t node) const noexcept { return children(node).count == 0; }
 
+    /// True for an exact tree that is no prefix: each leaf then has 1 ... kMaxLeafTriangles triangles, and each
+    /// triangle belongs to one leaf. Without triangles the counts below are 0.
+    bool has_triangles() const noexcept { return vertices_ != nullptr; }
+    uint32_t triangle_count() const noexcept { return triangle_count_; }
+    uint32_t vertex_count() const noexcept { return vertex_count_; }
+    /// Vertices 0 ... component_count() - 1 are one of each part of the surface that hangs together: what a point-in-
+    /// solid test needs to tell whether one solid holds a part of another whose surface it does not meet.
+    uint32_t component_count() const noexcept { return component_count_; }
+    /// Triangles of `node` < node_count(); none for an inner node.
+    TriangleRange triangles(uint32_t node) const noexcept;
+    /// Vertex indices of triangle `t` < triangle_count(), in the mesh's order: counter-clockwise seen from outside.
+    Triangle triangle(uint32_t t) const noexcept;
+    /// Position of vertex `v` < vertex_count(), the mesh's own float coordinates, metres.
+    Vec3 vertex(uint32_t v) const noexcept;
+
     /// Calls visit(node) for each node of the cut at `l`: the nodes of that level and the leaves above it.
     template <class Visit> void for_each_in_cut(uint32_t l, Visit&& visit) const {
         const LevelInfo last = level(l);
@@ -110,6 +163,11 @@ private:
     uint32_t node_count_ = 0;
     uint32_t level_count_ = 0;
     bool is_prefix_ = false;
+    const std::byte* vertices_ = nullptr;  // null without triangles
+    const std::byte* triangles_ = nullptr; // vertex indices, three each
+    uint32_t vertex_count_ = 0;
+    uint32_t triangle_count_ = 0;
+    uint32_t component_count_ = 0;
 };
 
 /// A tree that owns its bytes.

@@ -7,6 +7,7 @@
 //  - all of these types are standard-layout, so that a C binding or a memcpy is safe.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 namespace prolate {
@@ -16,6 +17,8 @@ struct Vec3 {
     float x = 0, y = 0, z = 0;
     friend bool operator==(const Vec3&, const Vec3&) = default;
 };
+
+using Triangle = std::array<uint32_t, 3>; ///< three vertex indices
 
 /// Rotation as a quaternion. Queries normalise it, so its length need not be exactly 1; it must not be 0.
 struct Quat {

@@ -9,8 +9,8 @@
 
 namespace prolate {
 
-/// Newest .etree format version that this library reads, and the one that it writes (src/FORMAT.md).
-inline constexpr uint16_t kFormatVersion = 1;
+/// The .etree format version that this library reads and writes (src/FORMAT.md).
+inline constexpr uint16_t kFormatVersion = 2;
 
 /// major * 10000 + minor * 100 + patch, as the headers say it.
 inline constexpr uint32_t kHeaderVersion =

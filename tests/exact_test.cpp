@@ -1,0 +1,496 @@
+// Exact trees: every triangle in its place, the proof, and queries against brute force over all pairs of triangles.
+#include "builder/random.hpp"
+#include "src/bytes.hpp"
+#include "tests/reference.hpp"
+#include "tests/scenes.hpp"
+#include "tests/shapes.hpp"
+
+#include <prolate/build.hpp>
+#include <prolate/query.hpp>
+#include <prolate/verify.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+#include <tuple>
+
+namespace prolate {
+namespace {
+
+using scenes::Point;
+
+Build must_build(const Mesh& mesh, BuildOptions options = {}) {
+    options.exact = true;
+    auto built = build(mesh.view(), options);
+    if (!built) throw std::runtime_error(built.error().what);
+    return std::move(*built);
+}
+
+// ---- meshes ----
+
+Mesh duplicated() { // more equal triangles than a leaf takes
+    Mesh mesh = shapes::tetrahedron();
+    for (int i = 0; i < 3; ++i)
+        mesh.triangles.insert(mesh.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+    return mesh;
+}
+Mesh spiral() { // sizes from 1 to 1e-36: the best splits take off a triangle or two at a time
+    Mesh mesh;
+    float s = 1;
+    for (int i = 0; i < 60; ++i, s *= 0.25f)
+        shapes::append(mesh, {{{s, 0, 0}, {0.9f * s, s, 0}, {0, s, s}}, {{0, 1, 2}}});
+    return mesh;
+}
+
+struct Model {
+    const char* name;
+    Mesh mesh;
+    uint32_t components;
+};
+void PrintTo(const Model& model, std::ostream* out) {
+    *out << model.name;
+}
+
+class ExactTreeOf : public testing::TestWithParam<Model> {};
+
+std::array<std::tuple<float, float, float>, 3> positions(const auto& vertex, const Triangle& t) {
+    std::array<std::tuple<float, float, float>, 3> out;
+    for (size_t i = 0; i < 3; ++i) {
+        const Vec3 p = vertex(t[i]);
+        out[i] = {p.x, p.y, p.z};
+    }
+    return out;
+}
+
+TEST_P(ExactTreeOf, HoldsEveryTriangleInOneLeafAndAllEllipsoidsAbove) {
+    for (const auto& [degree, leaf] : {std::pair{8u, 4u}, {2u, 1u}, {3u, 7u}, {64u, 127u}}) {
+        BuildOptions options;
+        options.degree = degree, options.leaf_triangles = leaf;
+        const Build built = must_build(GetParam().mesh, options);
+        const TreeView tree = built.tree.view();
+        ASSERT_TRUE(tree.has_triangles() && tree.bake_info().exact);
+        EXPECT_EQ(tree.degree(), degree);
+
+        // The mesh's triangles, as they are.
+        const CleanMesh clean = *prolate::clean(GetParam().mesh.view());
+        std::multiset<std::array<std::tuple<float, float, float>, 3>> expected, held;
+        for (const Triangle& t : clean.mesh.triangles)
+            expected.insert(positions([&](uint32_t v) { return clean.mesh.vertices[v]; }, t));
+        std::vector<uint32_t> parent(tree.node_count());
+        uint32_t triangles = 0;
+        for (uint32_t n = 0; n < tree.node_count(); ++n) {
+            const ChildRange children = tree.children(n);
+            EXPECT_NE(children.count, 1u);
+            for (uint32_t c = 0; c < children.count; ++c) parent[children.first + c] = n;
+            const TriangleRange range = tree.triangles(n);
+            EXPECT_LE(range.count, leaf);
+            triangles += range.count;
+            for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+                held.insert(positions([&](uint32_t v) { return tree.vertex(v); }, tree.triangle(t)));
+                for (const uint32_t corner : tree.triangle(t)) {
+                    const Vec3 v = tree.vertex(corner);
+                    const double p[3] = {v.x, v.y, v.z};
+                    for (uint32_t node = n;; node = parent[node]) {
+                        ASSERT_LE(radial_squared(tree.ellipsoid(node), p), 1) << "node " << node;
+                        if (node == 0) break;
+                    }
+                }
+            }
+        }
+        EXPECT_TRUE(held == expected);
+        EXPECT_EQ(triangles, tree.triangle_count());
+
+        const auto proof = verify(tree, GetParam().mesh.view());
+        ASSERT_TRUE(proof);
+        EXPECT_TRUE(proof->covered && proof->exact);
+        EXPECT_EQ(proof->surface_mode, !clean.report.closed);
+        EXPECT_EQ(tree.bake_info().surface_mode, !clean.report.closed);
+        for (const LevelReport& level : built.levels) EXPECT_TRUE(level.covered);
+    }
+}
+
+TEST_P(ExactTreeOf, NamesOneVertexOfEachComponent) {
+    const Build built = must_build(GetParam().mesh);
+    const TreeView tree = built.tree.view();
+    EXPECT_EQ(tree.component_count(), GetParam().components);
+    std::vector<uint32_t> label(tree.vertex_count());
+    std::iota(label.begin(), label.end(), 0u);
+    for (bool changed = true; changed;) { // each vertex takes the least label of its neighbours
+        changed = false;
+        for (uint32_t t = 0; t < tree.triangle_count(); ++t) {
+            const auto [a, b, c] = tree.triangle(t);
+            const uint32_t least = std::min({label[a], label[b], label[c]});
+            for (const uint32_t v : {a, b, c})
+                if (label[v] != least) label[v] = least, changed = true;
+        }
+    }
+    for (uint32_t v = 0; v < tree.vertex_count(); ++v) EXPECT_LT(label[v], tree.component_count());
+    for (uint32_t v = 0; v < tree.component_count(); ++v) EXPECT_EQ(label[v], v);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Meshes, ExactTreeOf,
+    testing::Values(Model{"torus", shapes::torus(1, 0.3f, 48, 24), 1}, Model{"box", shapes::box(1, 2, 3), 1},
+                    Model{"two_pieces", shapes::two_pieces(), 2}, Model{"hollow", shapes::hollow_ball(), 2},
+                    Model{"sheet", shapes::sheet(1, 1, 40), 1}, // coplanar, and large enough for bins
+                    Model{"open_box", shapes::open_box(), 1}, Model{"duplicated", duplicated(), 1},
+                    Model{"spiral", spiral(), 60},
+                    Model{"one_triangle", Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, 1},
+                    Model{"micrometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e-6f), 1},
+                    Model{"far_away", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {1e4f, -1e4f, 5e3f}), 1}),
+    [](const auto& model) { return std::string(model.param.name); });
+
+TEST(ExactTree, SameBytesForAnyNumberOfThreads) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 96, 48);
+    BuildOptions options;
+    options.threads = 1;
+    const Build one = must_build(mesh, options);
+    for (const uint32_t threads : {2u, 8u}) {
+        options.threads = threads;
+        EXPECT_TRUE(std::ranges::equal(one.tree.bytes(), must_build(mesh, options).tree.bytes()));
+    }
+}
+
+TEST(ExactTree, EndsWhereTheFormatDoes) {
+    BuildOptions options;
+    options.degree = 2, options.leaf_triangles = 1;
+    EXPECT_EQ(must_build(spiral(), options).tree.view().level_count(), kMaxLevels); // then parts are halved
+}
+
+TEST(ExactTree, OptionsAreChecked) {
+    const Mesh mesh = shapes::box();
+    const auto error_of = [&](auto&& change) {
+        BuildOptions options;
+        options.exact = true;
+        change(options);
+        const auto built = build(mesh.view(), options);
+        return built ? ErrorCode{} : built.error().code;
+    };
+    EXPECT_EQ(error_of([](BuildOptions& o) { o.levels = 2; }), ErrorCode::bad_options);
+    EXPECT_EQ(error_of([](BuildOptions& o) { o.ellipsoids = 8; }), ErrorCode::bad_options);
+    EXPECT_EQ(error_of([](BuildOptions& o) { o.tolerance = 0.1f; }), ErrorCode::bad_options);
+    EXPECT_EQ(error_of([](BuildOptions& o) { o.leaf_triangles = 0; }), ErrorCode::bad_options);
+    EXPECT_EQ(error_of([](BuildOptions& o) { o.leaf_triangles = 128; }), ErrorCode::bad_options);
+    EXPECT_EQ(error_of([](BuildOptions& o) { o.leaf_triangles = 127; }), ErrorCode{});
+    BuildOptions proxy, exact, other;
+    exact.exact = other.exact = true, other.leaf_triangles = 3;
+    EXPECT_EQ((std::set{hash(proxy), hash(exact), hash(other)}).size(), 3u);
+    const auto cancelled = build(mesh.view(), exact, [](const BuildProgress&) { return false; });
+    ASSERT_FALSE(cancelled);
+    EXPECT_EQ(cancelled.error().code, ErrorCode::cancelled);
+}
+
+// ---- the proof ----
+
+TEST(ExactTree, TheProofNoticesAnotherMesh) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
+    const Build built = must_build(mesh);
+    const auto covered = [&](const Mesh& other) {
+        const VerifyReport report = *verify(built.tree.view(), other.view());
+        EXPECT_EQ(report.same_mesh, report.covered);
+        return report.covered;
+    };
+    EXPECT_TRUE(covered(mesh));
+    Mesh turned = mesh; // another order of triangles and corners is the same mesh
+    std::reverse(turned.triangles.begin(), turned.triangles.end());
+    for (Triangle& t : turned.triangles) std::rotate(t.begin(), t.begin() + 1, t.end());
+    EXPECT_TRUE(covered(turned));
+    EXPECT_FALSE(covered(shapes::inverted(mesh)));
+    Mesh moved = mesh, fewer = mesh, more = mesh;
+    moved.vertices[7].x += 1e-6f;
+    fewer.triangles.pop_back();
+    more.triangles.push_back({0, 13, 47});
+    EXPECT_FALSE(covered(moved));
+    EXPECT_FALSE(covered(fewer));
+    EXPECT_FALSE(covered(more));
+}
+
+TEST(ExactTree, TheProofNoticesNodesThatDoNotHoldTheirTriangles) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
+    const Build built = must_build(mesh);
+    const TreeView tree = built.tree.view();
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        const LevelInfo level = tree.level(l);
+        const uint32_t node = level.first_node + level.node_count / 2;
+        // Shrinks one node by an exponent.
+        std::vector<std::byte> bytes(built.tree.bytes().begin(), built.tree.bytes().end());
+        const size_t nodes = tree.level(0).end_byte - kNodeBytes;
+        bytes[nodes + node * kNodeBytes + 22] =
+            std::byte(std::to_integer<int>(bytes[nodes + node * kNodeBytes + 22]) - 1);
+        const auto shrunk = TreeView::open(bytes, {.check_hash = false});
+        ASSERT_TRUE(shrunk);
+        const auto proof = verify(*shrunk, mesh.view());
+        ASSERT_TRUE(proof);
+        EXPECT_FALSE(proof->covered);
+        EXPECT_TRUE(proof->same_mesh);
+        for (uint32_t other = 0; other < tree.level_count(); ++other)
+            EXPECT_EQ(proof->levels[other].covered, !(other == l || (other > l && tree.is_leaf(node)))) << l << other;
+        if (l == 0) {
+            EXPECT_TRUE(proof->levels[0].has_counterexample);
+            EXPECT_GT(proof->levels[0].depth, 0.1);
+        }
+    }
+}
+
+TEST(ExactTree, APrefixCoversTheSurface) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
+    const Build built = must_build(mesh);
+    const uint32_t levels = built.tree.view().level_count();
+    ASSERT_GE(levels, 4u);
+    for (uint32_t l = 0; l < levels; ++l) {
+        const auto prefix = TreeView::open(built.tree.bytes().first(built.tree.view().level(l).end_byte));
+        ASSERT_TRUE(prefix);
+        EXPECT_TRUE(prefix->is_prefix() && prefix->bake_info().exact && !prefix->has_triangles());
+        EXPECT_EQ(prefix->level_count(), l + 1);
+        EXPECT_EQ(prefix->triangle_count() + prefix->vertex_count() + prefix->component_count(), 0u);
+        for (uint32_t n = 0; n < prefix->node_count(); ++n) EXPECT_EQ(prefix->triangles(n).count, 0u);
+        if (l == 2) {
+            const auto proof = verify(*prefix, mesh.view());
+            ASSERT_TRUE(proof);
+            EXPECT_TRUE(proof->covered && !proof->exact);
+        }
+    }
+}
+
+// ---- queries ----
+
+struct Query {
+    Pose a, b;
+};
+
+// Least distance of two triangles of the bodies, by brute force; 0 if some meet.
+class Truth {
+public:
+    Truth(const Mesh& a, const Mesh& b, const Query& q) {
+        const auto place = [&](const Mesh& mesh, const Pose& pose) {
+            std::vector<reference::Corners> out;
+            for (const Triangle& t : mesh.triangles)
+                out.push_back(reference::placed({mesh.vertices[t[0]], mesh.vertices[t[1]], mesh.vertices[t[2]]}, pose,
+                                                q.a.translation));
+            return out;
+        };
+        const auto in_a = place(a, q.a), in_b = place(b, q.b);
+        const auto boxes_apart = [&](const reference::Corners& x, const reference::Corners& y) {
+            for (size_t k = 0; k < 3; ++k) {
+                const auto [x_low, x_high] = std::minmax({x[0][k], x[1][k], x[2][k]});
+                const auto [y_low, y_high] = std::minmax({y[0][k], y[1][k], y[2][k]});
+                if (x_low > y_high + least || y_low > x_high + least) return true;
+            }
+            return false;
+        };
+        for (const auto& x : in_a)
+            for (const auto& y : in_b)
+                if (!boxes_apart(x, y)) least = std::min(least, reference::distance(x, y));
+    }
+    reference::Real least = 0.05L; // farther ones do not matter
+};
+
+CollideResult ask(const Build& a, const Build& b, const Query& q, const QueryOptions& options = {}) {
+    CollideContext context;
+    return collide(a.tree.view(), q.a, b.tree.view(), q.b, context, options);
+}
+
+Query between(scenes::Random& random) {
+    const Point d = random.direction();
+    return {{{0.1f, 0.2f, 0.3f}, random.rotation()},
+            {scenes::to_float({4 * d[0], 4 * d[1], 4 * d[2]}), random.rotation()}};
+}
+// B on its way to A's place: at `t` = 0 apart, at 1 there.
+Query at(const Query& q, double t) {
+    const auto mix = [t](float a, float b) { return static_cast<float>(b + t * (double{a} - b)); };
+    Query out = q;
+    out.b.translation = {mix(q.a.translation.x, q.b.translation.x), mix(q.a.translation.y, q.b.translation.y),
+                         mix(q.a.translation.z, q.b.translation.z)};
+    return out;
+}
+
+struct Body {
+    Mesh mesh;
+    Build built;
+    Body(const Mesh& m) : mesh(m), built(must_build(m)) {}
+};
+std::vector<Body> bodies() {
+    std::vector<Body> out;
+    out.emplace_back(shapes::torus(1, 0.3f, 20, 10));
+    out.emplace_back(shapes::icosphere(2));
+    out.emplace_back(shapes::box(1, 1, 0.1f));
+    out.emplace_back(shapes::sheet(1, 1, 6));
+    out.emplace_back(shapes::open_box());
+    return out;
+}
+
+TEST(ExactQuery, AgreesWithBruteForceNearContact) {
+    const auto all = bodies();
+    scenes::Random random(5);
+    uint32_t apart = 0, meeting = 0;
+    for (const Body& a : all)
+        for (const Body& b : all)
+            for (int i = 0; i < 6; ++i) {
+                const Query start = between(random);
+                double near = 0, far = 1; // the first contact of the bisection
+                for (int step = 0; step < 22; ++step) {
+                    const double middle = (near + far) / 2;
+                    (ask(a.built, b.built, at(start, middle)).verdict == Verdict::separated ? near : far) = middle;
+                }
+                for (const double t :
+                     {near - 1e-2, near - 1e-4, near - 1e-6, near, far, far + 1e-6, far + 1e-4, far + 1e-2}) {
+                    const Query q = at(start, t);
+                    const CollideResult result = ask(a.built, b.built, q);
+                    const Truth truth(a.mesh, b.mesh, q);
+                    if (truth.least == 0) {
+                        ASSERT_EQ(result.verdict, Verdict::overlapping);
+                    } else if (truth.least > 1e-11L && !result.enclosed) {
+                        ASSERT_EQ(result.verdict, Verdict::separated);
+                    }
+                    apart += result.verdict == Verdict::separated;
+                    if (result.verdict != Verdict::overlapping || result.enclosed) continue;
+                    ++meeting;
+                    // The triangles that it names meet, and belong to the leaves that it names.
+                    const TreeView ta = a.built.tree.view(), tb = b.built.tree.view();
+                    const auto named = [](const TreeView& tree, uint32_t node, uint32_t triangle, const Pose& pose,
+                                          const Pose& origin) {
+                        const TriangleRange range = tree.triangles(node);
+                        EXPECT_TRUE(triangle >= range.first && triangle < range.first + range.count);
+                        const auto [x, y, z] = tree.triangle(triangle);
+                        return reference::placed({tree.vertex(x), tree.vertex(y), tree.vertex(z)}, pose,
+                                                 origin.translation);
+                    };
+                    ASSERT_LT(reference::distance(named(ta, result.node_a, result.triangle_a, q.a, q.a),
+                                                  named(tb, result.node_b, result.triangle_b, q.b, q.a)),
+                              1e-11L);
+                    ASSERT_GT(result.stats.triangle_tests, 0u);
+                }
+            }
+    EXPECT_GT(apart, 400u);
+    EXPECT_GT(meeting, 400u);
+}
+
+TEST(ExactQuery, TouchingAndCoplanarMeet) {
+    const Build box = must_build(shapes::box()), sheet = must_build(shapes::sheet(1, 1, 4));
+    const auto verdict = [](const Build& a, const Build& b, Vec3 move) { return ask(a, b, {{}, {move, {}}}).verdict; };
+    EXPECT_EQ(verdict(box, box, {1, 0, 0}), Verdict::overlapping); // face on face
+    EXPECT_EQ(verdict(box, box, {1, 0.5f, 0.25f}), Verdict::overlapping);
+    EXPECT_EQ(verdict(box, box, {1, 1, 0}), Verdict::overlapping);  // edge on edge
+    EXPECT_EQ(verdict(box, box, {1, 1, -1}), Verdict::overlapping); // corner on corner
+    EXPECT_EQ(verdict(box, box, {0, 0, 0}), Verdict::overlapping);
+    EXPECT_EQ(verdict(box, box, {1.0000002f, 0, 0}), Verdict::separated);
+    EXPECT_EQ(verdict(box, box, {1.0000002f, 1, 0}), Verdict::separated);
+    EXPECT_EQ(verdict(sheet, sheet, {0.3f, 0.3f, 0}), Verdict::overlapping);
+    EXPECT_EQ(verdict(sheet, sheet, {1, 0, 0}), Verdict::overlapping);
+    EXPECT_EQ(verdict(sheet, sheet, {1.0000002f, 0, 0}), Verdict::separated);
+    EXPECT_EQ(verdict(sheet, sheet, {0.3f, 0.3f, 1e-7f}), Verdict::separated);
+    EXPECT_EQ(verdict(box, sheet, {0.3f, 0.3f, 1}), Verdict::overlapping); // the sheet on a face
+    EXPECT_EQ(verdict(box, sheet, {0.3f, 0.3f, -1e-7f}), Verdict::separated);
+}
+
+TEST(ExactQuery, SeesOneBodyInsideTheOther) {
+    scenes::Random random(6);
+    const Build ball = must_build(shapes::icosphere(3)),
+                small = must_build(shapes::moved(shapes::icosphere(1), {}, 0.05f)),
+                inverted = must_build(shapes::inverted(shapes::icosphere(3))),
+                hollow = must_build(shapes::hollow_ball()),
+                sheet = must_build(shapes::moved(shapes::sheet(1, 1, 4), {-0.05f, -0.05f, 0}, 0.1f));
+    Mesh far_and_near = shapes::moved(shapes::icosphere(1), {3, 0, 0}, 0.05f);
+    shapes::append(far_and_near, shapes::moved(shapes::icosphere(1), {}, 0.05f));
+    const Build pieces = must_build(far_and_near);
+    Mesh cup_mesh = shapes::icosphere(3);
+    cup_mesh.triangles.pop_back();
+    const Build cup = must_build(cup_mesh);
+    const auto enclosed = [&](const Build& outer, const Build& inner, double away) {
+        const Point d = random.direction();
+        const Query q{{{}, random.rotation()},
+                      {scenes::to_float({away * d[0], away * d[1], away * d[2]}), random.rotation()}};
+        const CollideResult one = ask(outer, inner, q), other = ask(inner, outer, {q.b, q.a});
+        EXPECT_EQ(one.verdict, other.verdict);
+        EXPECT_EQ(one.enclosed, other.enclosed);
+        EXPECT_EQ(one.enclosed, one.verdict == Verdict::overlapping); // no case of this test has surfaces that meet
+        EXPECT_EQ(one.triangle_a, kNoTriangle);
+        for (uint32_t level = 0; one.enclosed && level < 3; ++level) // shallow covers do not meet either, and yet
+            EXPECT_EQ(ask(outer, inner, q, {.max_level = level}).verdict, Verdict::overlapping);
+        return one.enclosed;
+    };
+    for (int i = 0; i < 20; ++i) {
+        EXPECT_TRUE(enclosed(ball, small, 0.5));
+        EXPECT_TRUE(enclosed(inverted, small, 0.5));
+        EXPECT_TRUE(enclosed(ball, sheet, 0.5));     // an open surface inside a solid
+        EXPECT_FALSE(enclosed(hollow, small, 0.5));  // in the cavity
+        EXPECT_TRUE(enclosed(hollow, small, 0.895)); // in the wall
+        EXPECT_FALSE(enclosed(cup, small, 0.5));     // an open mesh encloses nothing
+        EXPECT_TRUE(enclosed(ball, pieces, 0.2));    // one piece of it
+    }
+}
+
+TEST(ExactQuery, AgainstATreeWithoutTriangles) {
+    BuildOptions options;
+    options.levels = 2, options.quality = Quality::fast;
+    const auto proxy_of = [&](const Mesh& mesh) { return std::move(*build(mesh.view(), options)); };
+    const Mesh torus = shapes::torus(1, 0.3f, 20, 10), grain = shapes::moved(shapes::icosphere(1), {}, 0.05f);
+    const Build proxy = proxy_of(torus), exact_torus = must_build(torus), exact = must_build(shapes::icosphere(1));
+    const TreeView tree = proxy.tree.view(), ball = exact.tree.view();
+    scenes::Random random(8);
+    uint32_t apart = 0, meeting = 0;
+    for (int i = 0; i < 80; ++i) {
+        const Query q = at(between(random), random.in(0.3, 0.8));
+        const CollideResult result = ask(exact, proxy, q), other = ask(proxy, exact, {q.b, q.a});
+        EXPECT_EQ(result.verdict, other.verdict);
+        EXPECT_EQ(result.triangle_a, other.triangle_b);
+        EXPECT_EQ(result.triangle_b, kNoTriangle);
+        // Truth: each leaf ellipsoid against each triangle.
+        bool meets = false, unclear = false;
+        for (uint32_t n = 0; n < tree.node_count(); ++n) {
+            if (!tree.is_leaf(n)) continue;
+            for (uint32_t t = 0; t < ball.triangle_count(); ++t) {
+                const auto [x, y, z] = ball.triangle(t);
+                const auto corners =
+                    reference::placed({ball.vertex(x), ball.vertex(y), ball.vertex(z)}, q.a, q.a.translation);
+                const auto radius = reference::radius(corners, tree.ellipsoid(n), q.b, q.a.translation);
+                meets |= radius < 1;
+                unclear |= std::abs(radius - 1) < 1e-9L;
+            }
+        }
+        if (unclear) continue;
+        EXPECT_EQ(result.verdict == Verdict::overlapping && !result.enclosed, meets);
+        if (meets) {
+            EXPECT_NE(result.triangle_a, kNoTriangle);
+        }
+        apart += !meets, meeting += meets;
+    }
+    EXPECT_GT(apart, 15u);
+    EXPECT_GT(meeting, 15u);
+
+    const Build small = proxy_of(grain);
+    const CollideResult inside = ask(exact, small, {{}, {{0.3f, 0, 0}, {}}});
+    EXPECT_EQ(inside.verdict, Verdict::overlapping);
+    EXPECT_TRUE(inside.enclosed);
+    EXPECT_EQ(ask(exact_torus, small, {}).verdict, Verdict::separated); // in the torus' hole
+}
+
+TEST(ExactQuery, ABudgetIsExactAndDeeperNeverRevokesSeparated) {
+    const auto all = bodies();
+    scenes::Random random(9);
+    for (const Body& a : all)
+        for (const Body& b : all)
+            for (int i = 0; i < 4; ++i) {
+                const Query q = at(between(random), random.in(0.5, 1));
+                const CollideResult full = ask(a.built, b.built, q);
+                const uint64_t need = full.stats.pair_tests;
+                for (uint64_t budget = 0; budget <= need + 1; budget += 1 + budget / 4) {
+                    const CollideResult result = ask(a.built, b.built, q, {.max_pair_tests = budget});
+                    ASSERT_EQ(result.verdict, budget < need ? Verdict::undecided : full.verdict);
+                    ASSERT_EQ(result.stats.pair_tests, std::min(budget, need));
+                }
+                Verdict before = Verdict::overlapping;
+                for (uint32_t level = 0; level < 6; ++level) {
+                    const Verdict verdict = ask(a.built, b.built, q, {.max_level = level}).verdict;
+                    ASSERT_FALSE(before == Verdict::separated && verdict != Verdict::separated);
+                    before = verdict;
+                }
+                ASSERT_EQ(before, full.verdict);
+            }
+}
+
+} // namespace
+} // namespace prolate
