@@ -18,7 +18,8 @@ namespace {
 constexpr const char* kFooter = R"(
 The pose is that of B in the frame of A: translation tx,ty,tz, then optionally the rotation as a quaternion
 qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapping" speaks of the covers: the solids
-may still be apart by what the covers stick out. The exit code is 0 whatever the verdict.
+may still be apart by what the covers stick out. Of exact trees, it speaks of their triangles, or of a body inside the
+other. The exit code is 0 whatever the verdict.
 
 Examples:
   prolate collide horse.etree bunny.etree --pose 0.5,0,0
@@ -77,16 +78,28 @@ int run(const CollideArguments& a) {
         out["verdict"] = verdict;
         out["node_a"] = meet ? nlohmann::ordered_json(result.node_a) : nullptr;
         out["node_b"] = meet ? nlohmann::ordered_json(result.node_b) : nullptr;
+        const auto triangle = [](uint32_t t) { return t == kNoTriangle ? nullptr : nlohmann::ordered_json(t); };
+        out["triangle_a"] = triangle(result.triangle_a);
+        out["triangle_b"] = triangle(result.triangle_b);
+        out["enclosed"] = result.enclosed;
         out["pair_tests"] = result.stats.pair_tests;
         out["evaluations"] = result.stats.evaluations;
+        out["triangle_tests"] = result.stats.triangle_tests;
         out["deepest_level"] = result.stats.deepest_level;
         print(out.dump(2) + '\n');
         return kDone;
     }
-    print(meet ? fmt::format("{}: node {} of A and node {} of B meet\n", verdict, result.node_a, result.node_b)
-               : fmt::format("{}\n", verdict));
-    print(fmt::format("{} pair tests, {} evaluations, deepest level {}\n", grouped(result.stats.pair_tests),
-                      grouped(result.stats.evaluations), result.stats.deepest_level));
+    const auto part = [](uint32_t node, uint32_t triangle) {
+        return triangle == kNoTriangle ? fmt::format("node {}", node) : fmt::format("triangle {}", triangle);
+    };
+    print(!meet ? fmt::format("{}\n", verdict)
+          : result.enclosed
+              ? fmt::format("{}: a part of one lies inside the other\n", verdict)
+              : fmt::format("{}: {} of A and {} of B meet\n", verdict, part(result.node_a, result.triangle_a),
+                            part(result.node_b, result.triangle_b)));
+    print(fmt::format("{} pair tests, {} evaluations, {} triangle tests, deepest level {}\n",
+                      grouped(result.stats.pair_tests), grouped(result.stats.evaluations),
+                      grouped(result.stats.triangle_tests), result.stats.deepest_level));
     return kDone;
 }
 

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <numeric>
+#include <utility>
 
 #include <unistd.h>
 
@@ -17,6 +20,7 @@ namespace {
 std::atomic<bool> interrupted_flag{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch only lock-free atomics");
 int output_errno = 0; // of the first failed write to standard output
+std::string part_of_work, last_complaint;
 
 int exit_code(ErrorCode code) {
     switch (code) {
@@ -79,8 +83,35 @@ std::string_view advice_for(const Error& error) {
     return "";
 }
 
-// The words of an error with what `where` means in it.
-std::string describe(const Error& error, std::string_view detail) {
+void print_line(std::string_view subject, std::string_view what, std::string_view advice) {
+    std::string line = fmt::format("prolate: {}{}: {}", part_of_work, subject, what);
+    if (!advice.empty()) line += fmt::format("; {}", advice);
+    for (char& c : line) // a file name or a reader's words may hold anything; this stays one line
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+    line += '\n';
+    std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+int complain_with_advice(std::string_view subject, const Error& error, std::string_view detail,
+                         std::string_view advice) {
+    if (error.code == ErrorCode::cancelled)
+        return complain(kInterrupted, subject, "interrupted", "nothing was written");
+    return complain(exit_code(error.code), subject, words_of(error, detail), advice);
+}
+
+extern "C" void on_signal(int) {
+    interrupted_flag.store(true);
+}
+
+} // namespace
+
+int complain(int code, std::string_view subject, std::string_view what, std::string_view advice) {
+    last_complaint = fmt::format("{}: {}", subject, what);
+    print_line(subject, what, advice);
+    return code;
+}
+
+std::string words_of(const Error& error, std::string_view detail) {
     std::string what = error.what;
     if (error.code == ErrorCode::io && error.where != 0)
         what += fmt::format(": {}", std::strerror(static_cast<int>(error.where)));
@@ -94,41 +125,23 @@ std::string describe(const Error& error, std::string_view detail) {
     return what;
 }
 
-void print_line(std::string_view subject, std::string_view what, std::string_view advice) {
-    std::string line = fmt::format("prolate: {}: {}", subject, what);
-    if (!advice.empty()) line += fmt::format("; {}", advice);
-    for (char& c : line) // a file name or a reader's words may hold anything; this stays one line
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-    line += '\n';
-    std::fwrite(line.data(), 1, line.size(), stderr);
-}
-
-int complain_with_advice(std::string_view subject, const Error& error, std::string_view detail,
-                         std::string_view advice) {
-    if (error.code == ErrorCode::cancelled)
-        print_line(subject, "interrupted", "nothing was written");
-    else
-        print_line(subject, describe(error, detail), advice);
-    return exit_code(error.code);
-}
-
-extern "C" void on_signal(int) {
-    interrupted_flag.store(true);
-}
-
-} // namespace
-
-int complain(int code, std::string_view subject, std::string_view what, std::string_view advice) {
-    print_line(subject, what, advice);
-    return code;
-}
-
 int complain(std::string_view subject, const Error& error, std::string_view detail) {
     return complain_with_advice(subject, error, detail, advice_for(error));
 }
 
 void note(std::string_view subject, std::string_view text) {
     print_line(subject, text, "");
+}
+
+PartOfWork::PartOfWork(std::string part) {
+    part_of_work = std::move(part) + ": ";
+    last_complaint.clear();
+}
+PartOfWork::~PartOfWork() {
+    part_of_work.clear();
+}
+const std::string& PartOfWork::complaint() const {
+    return last_complaint;
 }
 
 std::optional<Mesh> read_mesh(const std::string& path, int& code) {
@@ -211,7 +224,7 @@ bool interrupted() noexcept {
     return interrupted_flag.load();
 }
 
-ProgressLine::ProgressLine() : terminal_(::isatty(STDERR_FILENO) == 1) {}
+ProgressLine::ProgressLine(std::string label) : label_(std::move(label)), terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 ProgressLine::~ProgressLine() {
     if (dirty_) std::fputs("\r\x1b[K", stderr);
@@ -222,12 +235,32 @@ bool ProgressLine::show(std::string_view stage, double fraction, uint32_t nodes)
     if (terminal_ && (!dirty_ || now - drawn_ > std::chrono::milliseconds(100))) {
         const double seconds = std::chrono::duration<double>(now - start_).count();
         const std::string count = nodes > 0 ? fmt::format("  {} nodes", grouped(nodes)) : "";
-        fmt::print(stderr, "\r\x1b[K{:<12} {:3.0f} %{}  {:.0f} s", stage, 100 * fraction, count, seconds);
+        const auto left = remaining_.after(seconds, fraction);
+        fmt::print(stderr, "\r\x1b[K{}{:<12} {:3.0f} %{}  {:.0f} s{}", label_, stage, 100 * fraction, count, seconds,
+                   left ? fmt::format(", about {} left", rounded_time(*left)) : "");
         std::fflush(stderr);
         drawn_ = now;
         dirty_ = true;
     }
     return !interrupted();
+}
+
+std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
+    // Levenshtein distance: how many letters to insert, delete or change.
+    const auto distance = [word](std::string_view other) {
+        std::vector<size_t> row(other.size() + 1);
+        std::iota(row.begin(), row.end(), size_t{0});
+        for (size_t i = 0; i < word.size(); ++i) {
+            size_t diagonal = std::exchange(row[0], i + 1);
+            for (size_t j = 0; j < other.size(); ++j)
+                diagonal =
+                    std::exchange(row[j + 1], std::min({row[j + 1] + 1, row[j] + 1, diagonal + (word[i] != other[j])}));
+        }
+        return row.back();
+    };
+    const auto nearest = std::min_element(known.begin(), known.end(),
+                                          [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+    return nearest != known.end() && distance(*nearest) <= 1 + word.size() / 4 ? *nearest : "";
 }
 
 std::string extension(const std::string& path) {

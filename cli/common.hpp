@@ -6,6 +6,7 @@
 #pragma once
 
 #include "cli/grouped.hpp"
+#include "cli/remaining.hpp"
 
 #include <prolate/error.hpp>
 #include <prolate/mesh.hpp>
@@ -19,6 +20,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -29,7 +31,7 @@ namespace prolate::cli {
 /// Exit codes; `prolate --help` lists them, scripts depend on them.
 enum ExitCode : int {
     kDone = 0,
-    kNo = 1,            ///< the work was done and the answer is "no" (verify)
+    kNo = 1,            ///< the work was done and the answer is "no" (verify), or some of it failed (bake --manifest)
     kUsage = 2,         ///< the command line asks for what does not exist
     kBadInput = 3,      ///< a file's content cannot be used
     kIo = 4,            ///< the operating system refused to read or write
@@ -55,8 +57,22 @@ int complain(int code, std::string_view subject, std::string_view what, std::str
 /// `detail` adds the words of a third party.
 int complain(std::string_view subject, const Error& error, std::string_view detail = {});
 
+/// The words of an error, with what its `where` means in it.
+std::string words_of(const Error& error, std::string_view detail = {});
+
 /// Prints the line "prolate: <subject>: <text>" on stderr; no error.
 void note(std::string_view subject, std::string_view text);
+
+/// While it lives, lines of complain() and note() begin with "prolate: <part>: ": the work is one part of many.
+class PartOfWork {
+public:
+    explicit PartOfWork(std::string part);
+    ~PartOfWork();
+    PartOfWork(const PartOfWork&) = delete;
+    PartOfWork& operator=(const PartOfWork&) = delete;
+    /// The last complaint since, without the part's name and the advice.
+    const std::string& complaint() const;
+};
 
 /// Reads a mesh or a tree; reports the reason and sets `code` if it cannot.
 std::optional<Mesh> read_mesh(const std::string& path, int& code);
@@ -82,11 +98,12 @@ int finish_output(int code);
 void catch_signals();
 bool interrupted() noexcept;
 
-/// One line on stderr, redrawn about ten times a second: stage, percent, nodes, elapsed time. Silent if stderr is no
-/// terminal. The destructor wipes the line.
+/// One line on stderr, redrawn about ten times a second: stage, percent, nodes, elapsed and remaining time. Silent if
+/// stderr is no terminal. The destructor wipes the line.
 class ProgressLine {
 public:
-    ProgressLine();
+    /// `label` stands at the line's beginning.
+    explicit ProgressLine(std::string label = "");
     ~ProgressLine();
     ProgressLine(const ProgressLine&) = delete;
     ProgressLine& operator=(const ProgressLine&) = delete;
@@ -95,9 +112,14 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
+    std::string label_;
+    RemainingTime remaining_;
     Clock::time_point start_ = Clock::now(), drawn_{};
     bool terminal_ = false, dirty_ = false;
 };
+
+/// The one of `known` that was probably meant by `word`; "" if none is near.
+std::string nearest_word(std::string_view word, const std::vector<std::string>& known);
 
 /// The extension of a file name in lower case, without the dot: "Out.PLY" -> "ply"; "" if there is none.
 std::string extension(const std::string& path);

@@ -20,7 +20,8 @@ namespace {
 constexpr const char* kFooter = R"(
 The cut at a level (its nodes and the leaves above it) covers the solid. Without --level: csv holds the cut of every
 level, a leaf above it again for each; json holds every node once, with its own level; ply pictures the finest cut.
-With --level L: the cut at L.
+With --level L: the cut at L. Of an exact tree, these are the ellipsoids, and json adds the triangles of each leaf, as
+places in the file's order.
 csv: level,cx,cy,cz,r1,r2,r3,R11,...,R33: center, radii, and the rotation row by row; its column i is the direction
 of radius i. ply: ellipsoids as meshes, their corners on the ellipsoids, one color for each child of the root.
 
@@ -85,6 +86,7 @@ std::string as_json(const TreeView& tree, const Selection& selection) {
         const Ellipsoid e = tree.ellipsoid(node);
         const PrincipalAxes axes = principal_axes(e);
         const ChildRange children = tree.children(node);
+        const TriangleRange triangles = tree.triangles(node);
         // As doubles, which print all digits of the float that they come from.
         out["nodes"].push_back({{"node", node},
                                 {"level", selection.levels[i]},
@@ -94,6 +96,10 @@ std::string as_json(const TreeView& tree, const Selection& selection) {
                                 {"factor", std::array<double, 6>{e.l11, e.l21, e.l22, e.l31, e.l32, e.l33}},
                                 {"radii", axes.radii},
                                 {"rotation", axes.rotation}});
+        if (tree.has_triangles()) {
+            out["nodes"].back()["first_triangle"] = triangles.first;
+            out["nodes"].back()["triangle_count"] = triangles.count;
+        }
     }
     return out.dump(1) + '\n';
 }

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <new>
-#include <numeric>
 
 namespace prolate::cli {
 namespace {
@@ -20,31 +19,15 @@ Examples:
   prolate export horse.etree -o horse.csv --level 2
   prolate collide horse.etree horse.etree --pose 0.5,0,0
 
-Exit codes: 0 done, 1 the answer is "no" (verify), 2 usage, 3 bad input, 4 reading or writing failed,
-5 an error in prolate itself, 130 interrupted.
+Exit codes: 0 done, 1 the answer is "no" (verify) or some assets failed (bake --manifest), 2 usage, 3 bad input,
+4 reading or writing failed, 5 an error in prolate itself, 130 interrupted.
 
 'prolate COMMAND --help' tells more.)";
 
-// Levenshtein distance: how many letters to insert, delete or change.
-size_t distance(std::string_view a, std::string_view b) {
-    std::vector<size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), size_t{0});
-    for (size_t i = 0; i < a.size(); ++i) {
-        size_t diagonal = std::exchange(row[0], i + 1);
-        for (size_t j = 0; j < b.size(); ++j)
-            diagonal = std::exchange(row[j + 1], std::min({row[j + 1] + 1, row[j] + 1, diagonal + (a[i] != b[j])}));
-    }
-    return row.back();
-}
-
 // "did you mean 'bake'?", or where to look.
 std::string hint(std::string_view word, const std::vector<std::string>& known, const std::string& otherwise) {
-    const auto nearest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-        return distance(word, a) < distance(word, b);
-    });
-    if (nearest != known.end() && distance(word, *nearest) <= 1 + word.size() / 4)
-        return fmt::format("did you mean '{}'?", *nearest);
-    return otherwise;
+    const std::string near = nearest_word(word, known);
+    return near.empty() ? otherwise : fmt::format("did you mean '{}'?", near);
 }
 
 // Looks for unknown words first: the parser would rather complain of something that is missing because of them.

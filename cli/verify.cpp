@@ -14,7 +14,8 @@ namespace {
 
 constexpr const char* kFooter = R"(
 The proof knows nothing of how the tree was made. Exit code 0: every level covers; 1: some level does not, or it
-could not be proved. An open mesh has no inside; then only its triangles are proved.
+could not be proved. An open mesh has no inside; then only its triangles are proved. An exact tree must hold the mesh's
+triangles, each in one leaf, and in every ellipsoid above it.
 
 Examples:
   prolate verify horse.etree horse.obj
@@ -30,6 +31,8 @@ std::string as_json(const VerifyReport& report, bool same_mesh) {
     nlohmann::ordered_json out;
     out["covered"] = report.covered;
     out["surface_mode"] = report.surface_mode;
+    out["exact"] = report.exact;
+    out["same_triangles"] = report.exact ? nlohmann::ordered_json(report.same_mesh) : nullptr;
     out["baked_from_this_mesh"] = same_mesh;
     out["levels"] = nlohmann::ordered_json::array();
     for (const LevelProof& level : report.levels) {
@@ -54,13 +57,17 @@ std::string as_text(const VerifyReport& report) {
         const std::string point =
             fmt::format("({:.9g}, {:.9g}, {:.9g})", level.point[0], level.point[1], level.point[2]);
         if (level.covered)
-            out += fmt::format("level {}: covered, proved with {} pieces\n", l, grouped(level.pieces));
+            out += fmt::format("level {}: covered, proved with {} {}\n", l, grouped(level.pieces),
+                               report.exact ? "triangles" : "pieces");
         else if (level.has_counterexample)
             out += fmt::format("level {}: NOT covered: {} lies in no ellipsoid, by {:.3g} of a radius\n", l, point,
                                level.depth);
         else
             out += fmt::format("level {}: not proved: undecided at {}\n", l, point);
     }
+    if (report.exact)
+        out += report.same_mesh ? "exact tree: its triangles are the mesh's\n"
+                                : "exact tree: its triangles are NOT the mesh's\n";
     if (report.surface_mode) out += "surface mode: the mesh is open, so its triangles were proved and no inside\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;

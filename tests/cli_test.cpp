@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -18,9 +19,11 @@
 #include <optional>
 #include <sstream>
 #include <thread>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -94,6 +97,8 @@ struct RunOptions {
     std::string stdout_path;                                       // instead of a file that is read back
     std::function<void()> in_child = [] {};                        // after fork; only async-signal-safe calls
     std::optional<std::chrono::milliseconds> interrupt_after = {}; // Ctrl-C so long after the program first catches it
+    std::function<bool()> interrupt_when = {};                     // Ctrl-C as soon as this holds
+    bool terminal = false;                                         // stderr is one
 };
 
 // Does the process catch SIGINT yet?
@@ -104,10 +109,18 @@ bool catches_interrupt(pid_t pid) {
     return false;
 }
 
+// The master's side of a new pseudo-terminal.
+int open_terminal() {
+    const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    EXPECT_TRUE(terminal >= 0 && ::grantpt(terminal) == 0 && ::unlockpt(terminal) == 0);
+    return terminal;
+}
+
 class Cli : public ::testing::Test {
 protected:
     // One bake for all tests that only need some tree.
     static void SetUpTestSuite() {
+        ::unsetenv("PROLATE_CACHE");
         std::string name = (fs::temp_directory_path() / "prolate-cli-XXXXXX").string();
         ASSERT_NE(::mkdtemp(name.data()), nullptr);
         shared_ = name;
@@ -143,10 +156,12 @@ protected:
         for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
         argv.push_back(nullptr);
         const std::string& target = options.stdout_path.empty() ? out : options.stdout_path;
+        const int terminal = options.terminal ? open_terminal() : -1;
         const pid_t pid = ::fork();
         if (pid == 0) {
             ::dup2(::open(target.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), 1);
-            ::dup2(::open(err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), 2);
+            const char* const to = options.terminal ? ::ptsname(terminal) : err.c_str();
+            ::dup2(::open(to, O_WRONLY | O_CREAT | O_TRUNC | O_NOCTTY, 0600), 2);
             options.in_child();
             ::execv(PROLATE_COMMAND, argv.data());
             ::_exit(127);
@@ -156,6 +171,16 @@ protected:
             while (!catches_interrupt(pid) && ::waitpid(pid, &status, WNOHANG) == 0) std::this_thread::yield();
             std::this_thread::sleep_for(*options.interrupt_after);
             ::kill(pid, SIGINT);
+        }
+        if (options.interrupt_when) {
+            while (!options.interrupt_when() && ::waitpid(pid, &status, WNOHANG) == 0) std::this_thread::yield();
+            ::kill(pid, SIGINT);
+        }
+        if (options.terminal) { // it holds little, and would block the program when full
+            std::ofstream copy(err, std::ios::binary);
+            char buffer[4096];
+            for (ssize_t n; (n = ::read(terminal, buffer, sizeof buffer)) > 0;) copy.write(buffer, n);
+            ::close(terminal);
         }
         ::waitpid(pid, &status, 0);
         return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status),
@@ -189,12 +214,16 @@ protected:
 
 TEST_F(Cli, BakeReportsEachLevel) {
     std::istringstream lines(baked_out_);
-    std::string line;
-    std::getline(lines, line);
-    for (const char* column : {"level", "nodes", "outside ratio", "covered", "bytes", "seconds"})
-        EXPECT_NE(line.find(column), std::string::npos) << line;
+    std::string line, heading;
+    for (int i = 0; i < 2 && std::getline(lines, line); ++i) heading += line + '\n';
+    for (const char* column : {"level", "nodes", "outside ratio", "+/-", "singly", "E_sur", "H max", "mean", "99 %",
+                               "% of the diagonal", "covered", "bytes", "seconds"})
+        EXPECT_NE(heading.find(column), std::string::npos) << heading;
     int levels = 0;
-    for (; std::getline(lines, line); ++levels) EXPECT_NE(line.find("yes"), std::string::npos) << line;
+    for (; std::getline(lines, line); ++levels) {
+        EXPECT_NE(line.find("proved"), std::string::npos) << line;
+        EXPECT_LE(line.size(), 100u);
+    }
     EXPECT_EQ(levels, 3);
     EXPECT_EQ(baked_err_.find('\r'), std::string::npos) << "no progress line where stderr is no terminal";
     // 6 sides of 8 x 8 squares, whose points are shared: 6 * 8 * 8 + 2 points, 2 triangles and 4 corners a square.
@@ -206,6 +235,25 @@ TEST_F(Cli, BakeReportsEachLevel) {
     EXPECT_EQ(report["levels"][0]["nodes"], 1);
     EXPECT_EQ(report["levels"][2]["bytes"], fs::file_size(shared("peanut.etree")));
     EXPECT_TRUE(report["diagnosis"]["closed"]);
+    EXPECT_EQ(report["source"], "baked");
+    EXPECT_TRUE(report["goal_reached"]);
+    Vec3 low{9, 9, 9}, high{-9, -9, -9};
+    for (const Vec3& v : peanut(8).vertices) {
+        low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+        high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+    }
+    EXPECT_NEAR(report["diagonal"].get<double>(), std::hypot(high.x - low.x, high.y - low.y, high.z - low.z), 1e-5);
+    EXPECT_LT(report["solid_volume_error"], 1e-3 * report["solid_volume"].get<double>());
+    for (const Json& level : report["levels"]) {
+        EXPECT_TRUE(level["covered"]);
+        for (const char* figure : {"outside_ratio", "outside_ratio_error", "sum_outside_ratio", "union_volume",
+                                   "surface_error", "hausdorff_max", "hausdorff_mean", "hausdorff_p99", "seconds"})
+            EXPECT_GT(level[figure], 0) << figure;
+        EXPECT_LT(level["outside_ratio_error"], 1e-2);
+        EXPECT_GE(level["sum_outside_ratio"], level["outside_ratio"]);
+        EXPECT_NEAR(level["percent_of_diagonal"]["surface_error"].get<double>(),
+                    100 * level["surface_error"].get<double>() / report["diagonal"].get<double>(), 1e-4);
+    }
 }
 
 TEST_F(Cli, BakeIsTheSameForAnyNumberOfThreadsAndThroughAPipe) {
@@ -230,6 +278,86 @@ TEST_F(Cli, BakePrintsJson) {
     EXPECT_EQ(report["diagnosis"]["input_triangles"], 12);
     EXPECT_NEAR(report["solid_volume"].get<double>(), 8, 0.5);
     EXPECT_EQ(listing(), (std::vector<std::string>{"cube.etree", "cube.obj"}));
+}
+
+TEST_F(Cli, MethodAndPrimitiveAreRecorded) {
+    const std::string mesh = file("cube.obj", obj_text(cube()));
+    for (const auto& [option, value] :
+         {std::pair{"method", "voxel"}, {"method", "analytic"}, {"primitive", "sphere"}}) {
+        const std::string tree = file(std::string(value) + ".etree");
+        const Outcome o = run(
+            {"bake", mesh, "-o", tree, "--ellipsoids", "2", "--quality", "fast", std::string("--") + option, value});
+        EXPECT_EQ(o.code, 0) << o.err;
+        EXPECT_EQ(Json::parse(run({"info", tree, "--json"}).out)[option], value);
+        EXPECT_EQ(run({"verify", tree, mesh}).code, 0);
+    }
+    EXPECT_NE(read(file("voxel.etree")), read(file("analytic.etree")));
+}
+
+TEST_F(Cli, AnExactTreeThroughEveryCommand) {
+    const std::string mesh = shared("peanut.obj"), tree = file("exact.etree");
+    const Outcome baked = run({"bake", mesh, "-o", tree, "--exact", "--report", file("report.json")});
+    ASSERT_EQ(baked.code, 0) << baked.err;
+    EXPECT_NE(baked.out.find("with 768 triangles"), std::string::npos) << baked.out;
+    const Json report = Json::parse(read(file("report.json")));
+    EXPECT_EQ(report["exact"], true);
+    EXPECT_EQ(report["triangles"], 768);
+    EXPECT_EQ(report["bytes"], fs::file_size(tree));
+
+    const Json manifest{{"defaults", {{"levels", 1}}}, // which an exact tree would not take
+                        {"assets", {{{"mesh", mesh}, {"output", "other.etree"}, {"exact", true}}}}};
+    EXPECT_EQ(run({"bake", "--manifest", file("assets.json", manifest.dump())}).code, 0);
+    EXPECT_TRUE(read(file("other.etree")) == read(tree));
+
+    const Json info = Json::parse(run({"info", tree, "--json"}).out);
+    EXPECT_EQ(info["exact"], true);
+    EXPECT_EQ(info["vertices"], 386);
+    EXPECT_EQ(info["components"], 1);
+    EXPECT_NE(run({"info", tree}).out.find("768 triangles on 386 vertices, 1 connected component"), std::string::npos);
+    const std::string prefix = file("prefix.etree", read(tree).substr(0, info["levels"].back()["end_byte"]));
+    EXPECT_EQ(Json::parse(run({"info", prefix, "--json"}).out)["triangles"], 0);
+    EXPECT_NE(run({"info", prefix}).out.find("coarser tree"), std::string::npos);
+
+    const Outcome proved = run({"verify", tree, mesh});
+    EXPECT_EQ(proved.code, 0) << proved.out;
+    EXPECT_NE(proved.out.find("its triangles are the mesh's"), std::string::npos) << proved.out;
+    Mesh moved = peanut(8);
+    moved.vertices[0].x += 0.01f;
+    const Outcome refuted = run({"verify", tree, file("moved.obj", obj_text(moved)), "--json"});
+    EXPECT_EQ(refuted.code, 1);
+    EXPECT_EQ(Json::parse(refuted.out)["same_triangles"], false);
+    EXPECT_EQ(run({"verify", prefix, mesh}).code, 0);
+
+    ASSERT_EQ(run({"export", tree, "-o", file("a.json")}).code, 0);
+    uint32_t triangles = 0;
+    const Json exported = Json::parse(read(file("a.json")));
+    for (const Json& node : exported["nodes"]) triangles += node["triangle_count"].get<uint32_t>();
+    EXPECT_EQ(triangles, 768u);
+    EXPECT_EQ(run({"export", tree, "-o", file("a.csv")}).code, 0);
+    EXPECT_EQ(run({"export", tree, "-o", file("a.ply"), "--level", "1"}).code, 0);
+    EXPECT_EQ(run({"render", tree, mesh, "-o", file("a.png"), "--size", "400x300", "--samples", "16"}).code, 0);
+
+    const Json hit = Json::parse(run({"collide", tree, tree, "--pose", "0.5,0,0", "--json"}).out);
+    EXPECT_EQ(hit["verdict"], "overlapping");
+    EXPECT_TRUE(hit["triangle_a"].is_number() && hit["triangle_b"].is_number());
+    EXPECT_EQ(hit["enclosed"], false);
+    EXPECT_GT(hit["triangle_tests"], 0);
+    EXPECT_NE(run({"collide", tree, tree, "--pose", "0.5,0,0"}).out.find("overlapping: triangle "), std::string::npos);
+    ASSERT_EQ(run({"bake", file("grain.obj", obj_text(cube(0.01f))), "-o", file("grain.etree"), "--exact"}).code, 0);
+    EXPECT_NE(run({"collide", tree, file("grain.etree"), "--pose", "1.5,0.3,0"}).out.find("inside the other"),
+              std::string::npos);
+}
+
+TEST_F(Cli, ATerminalSeesTheProgress) {
+    RunOptions terminal;
+    terminal.terminal = true;
+    const Outcome o =
+        run({"bake", shared("peanut.obj"), "-o", file("peanut.etree"), "--levels", "1", "--quality", "fast"}, terminal);
+    EXPECT_EQ(o.code, 0);
+    EXPECT_NE(o.err.find(" %"), std::string::npos) << o.err;
+    const size_t wiped = o.err.rfind("\r\x1b[K");
+    ASSERT_NE(wiped, std::string::npos) << o.err;
+    EXPECT_TRUE(o.err.substr(wiped + 4).starts_with("prolate: ")) << "the line is gone before the next: " << o.err;
 }
 
 TEST_F(Cli, OneTriangleIsALegalOpenMesh) {
@@ -289,16 +417,14 @@ TEST_F(Cli, WrongUsageIsOneLineWithAHint) {
     expect_failure(bake_with({"--quality", "superb"}), 2, "--quality", "fast, normal or best");
     expect_failure(bake_with({"--method", "guess"}), 2, "--method", "no such method");
     expect_failure(bake_with({"--primitive", "torus"}), 2, "--primitive", "no such primitive");
+    expect_failure(bake_with({"--exact", "--levels", "2"}), 2, "bake", "no levels");
+    expect_failure(bake_with({"--exact", "--leaf-triangles", "128"}), 2, "bake", "1 to 127");
     expect_failure(bake_with({"--report", out}), 2, out, "two files");
     expect_failure(run({"bake", mesh, "-o", mesh}), 2, mesh, "the input itself");
     EXPECT_TRUE(listing().empty());
 }
 
 TEST_F(Cli, WhatThisVersionLacksIsRefusedByName) {
-    const std::string mesh = shared("peanut.obj"), out = file("out.etree");
-    expect_failure(run({"bake", mesh, "-o", out, "--method", "analytic"}), 2, "--method analytic", "this version");
-    expect_failure(run({"bake", mesh, "-o", out, "--primitive", "sphere"}), 2, "--primitive sphere", "this version");
-    expect_failure(run({"bake", mesh, "-o", out, "--exact"}), 2, "--exact", "this version");
     for (const char* format : {"glb", "pov", "obj"})
         expect_failure(run({"export", shared("peanut.etree"), "-o", file(std::string("out.") + format)}), 2, format,
                        "does not export");
@@ -359,12 +485,346 @@ TEST_F(Cli, LinksGoOnPointingAtTheirFile) {
     EXPECT_TRUE(read(target).starts_with("level,"));
 }
 
+// ---- what is not done twice ----
+
+// Of a file: what changes when it is written anew, even with the same bytes.
+ino_t identity(const std::string& path) {
+    struct stat status {};
+    return ::stat(path.c_str(), &status) == 0 ? status.st_ino : 0;
+}
+
+TEST_F(Cli, AnUnchangedAssetIsNotBakedAgain) {
+    const std::string mesh = file("cube.obj", obj_text(cube())), tree = file("cube.etree");
+    const std::vector<std::string> bake{"bake", mesh, "-o", tree, "--ellipsoids", "1", "--quality", "fast", "--json"};
+    const auto with = [&bake](std::vector<std::string> more) {
+        more.insert(more.begin(), bake.begin(), bake.end());
+        return run(more);
+    };
+    const Json first = Json::parse(run(bake).out);
+    EXPECT_EQ(first["source"], "baked");
+    const std::string bytes = read(tree);
+    const ino_t inode = identity(tree);
+
+    fs::last_write_time(mesh, fs::file_time_type::clock::now() + std::chrono::hours(1)); // dates do not matter
+    const Outcome again = run(bake);
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_NE(again.err.find(tree + ": unchanged"), std::string::npos) << again.err;
+    EXPECT_EQ(identity(tree), inode);
+    Json second = Json::parse(again.out);
+    EXPECT_EQ(second["source"], "unchanged");
+    EXPECT_TRUE(second["levels"][0]["seconds"].is_null());
+    second["levels"][0]["seconds"] = first["levels"][0]["seconds"];
+    EXPECT_EQ(second["levels"], first["levels"]);
+    EXPECT_EQ(second["diagnosis"], first["diagnosis"]);
+
+    EXPECT_EQ(Json::parse(with({"--threads", "1"}).out)["source"], "unchanged") << "it does not change the bytes";
+    // The report is written in any case.
+    EXPECT_EQ(with({"--report", file("report.json")}).code, 0);
+    EXPECT_EQ(Json::parse(read(file("report.json")))["source"], "unchanged");
+
+    EXPECT_EQ(Json::parse(with({"--force"}).out)["source"], "baked");
+    EXPECT_EQ(read(tree), bytes);
+    EXPECT_NE(identity(tree), inode);
+
+    EXPECT_EQ(Json::parse(with({"--seed", "4"}).out)["source"], "baked") << "another option";
+    EXPECT_NE(read(tree), bytes);
+    EXPECT_EQ(Json::parse(run(bake).out)["source"], "baked") << "and back";
+    EXPECT_EQ(read(tree), bytes);
+    write(mesh, obj_text(cube(1.5f)));
+    EXPECT_EQ(Json::parse(run(bake).out)["source"], "baked") << "another mesh by the same name";
+    EXPECT_NE(read(tree), bytes);
+    write(mesh, obj_text(cube()));
+
+    std::string damaged = bytes;
+    damaged[damaged.size() - 20] ^= 1;
+    write(tree, damaged);
+    EXPECT_EQ(Json::parse(run(bake).out)["source"], "baked");
+    EXPECT_EQ(read(tree), bytes);
+    // A prefix is a sound tree, but a coarser one.
+    const std::string whole = read(shared("peanut.etree"));
+    const std::string prefix =
+        file("prefix.etree", whole.substr(0, Json::parse(read(shared("report.json")))["levels"][1]["bytes"]));
+    EXPECT_EQ(run({"info", prefix}).code, 0);
+    EXPECT_EQ(
+        run({"bake", shared("peanut.obj"), "-o", prefix, "--levels", "2", "--degree", "4", "--quality", "fast"}).code,
+        0);
+    EXPECT_EQ(read(prefix), whole);
+}
+
+TEST_F(Cli, TheCacheServesEveryOutput) {
+    const std::string mesh = file("cube.obj", obj_text(cube())), cache = file("a/cache");
+    const auto bake = [&](const std::string& output) {
+        return run({"bake", mesh, "-o", output, "--ellipsoids", "1", "--quality", "fast", "--json", "--cache", cache});
+    };
+    const auto source = [&](const std::string& output) { return Json::parse(bake(output).out)["source"]; };
+    const auto entry = [&](const char* ending) {
+        std::string found;
+        for (const auto& e : fs::directory_iterator(cache))
+            if (e.path().extension() == ending) {
+                EXPECT_EQ(std::exchange(found, e.path().string()), "");
+            }
+        return found;
+    };
+    EXPECT_EQ(source(file("one.etree")), "baked");
+    const std::string bytes = read(file("one.etree"));
+    EXPECT_EQ(read(entry(".etree")), bytes);
+
+    const Json cached = Json::parse(bake(file("two.etree")).out);
+    EXPECT_EQ(cached["source"], "cached");
+    EXPECT_TRUE(cached["diagnosis"].is_null()) << "the mesh was not even imported";
+    EXPECT_EQ(read(file("two.etree")), bytes);
+    const Json unchanged = Json::parse(bake(file("two.etree")).out);
+    EXPECT_EQ(unchanged["source"], "unchanged");
+    EXPECT_TRUE(unchanged["diagnosis"].is_null());
+    // The same mesh in another file: it has to be read, and is recognised then.
+    const std::string copy = file("copy.obj", "# comment\n" + obj_text(cube()));
+    const Json other = Json::parse(run({"bake", copy, "-o", file("copy.etree"), "--ellipsoids", "1", "--quality",
+                                        "fast", "--json", "--cache", cache})
+                                       .out);
+    EXPECT_EQ(other["source"], "cached");
+    EXPECT_FALSE(other["diagnosis"].is_null());
+    fs::remove(copy);
+
+    // A damaged tree is found and replaced.
+    std::string damaged = bytes;
+    damaged[damaged.size() - 20] ^= 1;
+    write(entry(".etree"), damaged);
+    const Outcome repaired = bake(file("three.etree"));
+    EXPECT_EQ(Json::parse(repaired.out)["source"], "baked");
+    EXPECT_NE(repaired.err.find("damaged cache entry"), std::string::npos) << repaired.err;
+    EXPECT_EQ(read(file("three.etree")), bytes);
+    EXPECT_EQ(read(entry(".etree")), bytes);
+    // So is a sound one under a wrong name.
+    write(entry(".etree"), read(shared("peanut.etree")));
+    const Outcome renamed = bake(file("four.etree"));
+    EXPECT_EQ(Json::parse(renamed.out)["source"], "baked");
+    EXPECT_NE(renamed.err.find("not what its name says"), std::string::npos) << renamed.err;
+    EXPECT_EQ(read(file("four.etree")), bytes);
+    // A damaged .mesh entry costs an import and no more.
+    for (const auto& e : fs::directory_iterator(cache))
+        if (e.path().extension() == ".mesh") {
+            std::string content = read(e.path());
+            content[20] ^= 1;
+            write(e.path(), content);
+        }
+    const Json read_again = Json::parse(bake(file("four.etree")).out);
+    EXPECT_EQ(read_again["source"], "unchanged");
+    EXPECT_FALSE(read_again["diagnosis"].is_null());
+    EXPECT_TRUE(Json::parse(bake(file("four.etree")).out)["diagnosis"].is_null()) << "the entry is sound again";
+
+    // The environment names it as well, and an output from before fills it.
+    fs::remove_all(cache);
+    ::setenv("PROLATE_CACHE", cache.c_str(), 1);
+    const Outcome filled = run({"bake", mesh, "-o", file("one.etree"), "--ellipsoids", "1", "--quality", "fast"});
+    ::unsetenv("PROLATE_CACHE");
+    EXPECT_NE(filled.err.find("unchanged"), std::string::npos) << filled.err;
+    EXPECT_EQ(read(entry(".etree")), bytes);
+}
+
+TEST_F(Cli, ACacheThatCannotBeWrittenIsLeftOut) {
+    const std::string mesh = file("cube.obj", obj_text(cube())), cache = file("no folder", "") + "/cache";
+    const Outcome o =
+        run({"bake", mesh, "-o", file("cube.etree"), "--ellipsoids", "1", "--quality", "fast", "--cache", cache});
+    EXPECT_EQ(o.code, 0);
+    const std::string words = cache + ": the cache folder is left out";
+    EXPECT_NE(o.err.find(words), std::string::npos) << o.err;
+    EXPECT_EQ(o.err.find(words), o.err.rfind(words)) << "said once: " << o.err;
+    EXPECT_TRUE(fs::exists(file("cube.etree")));
+}
+
+// A tetrahedron whose fourth corner is at the given height; the numbers are in a file of their own.
+void write_gltf(const fs::path& folder, float height) {
+    const float corners[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, height};
+    const uint16_t indices[] = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+    write(folder / "shape.bin", std::string(reinterpret_cast<const char*>(corners), sizeof corners) +
+                                    std::string(reinterpret_cast<const char*>(indices), sizeof indices));
+    write(folder / "shape.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"uri": "shape.bin", "byteLength": 72}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 9]},
+                      {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"}]})");
+}
+
+TEST_F(Cli, AMeshInSeveralFilesIsKnownByAllOfThem) {
+    const auto source = [this](const std::string& output) {
+        const Outcome o = run({"bake", file("shape.gltf"), "-o", file(output), "--ellipsoids", "1", "--quality", "fast",
+                               "--json", "--cache", file("cache")});
+        EXPECT_EQ(o.code, 0) << o.err;
+        return Json::parse(o.out)["source"];
+    };
+    write_gltf(folder_, 1);
+    EXPECT_EQ(source("one.etree"), "baked");
+    EXPECT_EQ(source("one.etree"), "unchanged");
+    EXPECT_EQ(source("two.etree"), "cached");
+    write_gltf(folder_, 2); // the .gltf itself stays the same
+    EXPECT_EQ(source("one.etree"), "baked");
+    EXPECT_NE(read(file("one.etree")), read(file("two.etree")));
+    EXPECT_EQ(source("two.etree"), "cached");
+}
+
+// ---- manifests ----
+
+TEST_F(Cli, AManifestBakesAllThatItCan) {
+    fs::create_directory(folder_ / "in");
+    const std::string good = obj_text(cube());
+    write(folder_ / "in/cube.obj", good);
+    write(folder_ / "in/broken.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    const std::string manifest = file("assets.json", R"({
+        "defaults": {"quality": "fast", "ellipsoids": 1},
+        "assets": [
+          {"mesh": "in/cube.obj", "output": "one.etree"},
+          {"mesh": "in/broken.obj", "output": "broken.etree"},
+          {"mesh": "in/missing.obj", "output": "missing.etree"},
+          {"mesh": "in/cube.obj", "output": "levels.etree", "levels": 1, "degree": 3, "report": "levels.json"}
+        ]})");
+    const Outcome o = run({"bake", "--manifest", manifest}); // from another folder: paths are the manifest's
+    EXPECT_EQ(o.code, 1);
+    for (const char* words : {"asset 1 (in/cube.obj): ", "one.etree: baked", "asset 2 (in/broken.obj): ",
+                              "no triangles", "asset 3 (in/missing.obj): ", "No such file", "2 of 4 assets failed"})
+        EXPECT_NE(o.err.find(words), std::string::npos) << words << " in\n" << o.err;
+    EXPECT_LT(o.err.find("No such file"), o.err.find("one.etree: baked")) << "said before the work:\n" << o.err;
+    for (const char* words : {"asset", "nodes", "outside ratio", "bytes", "seconds", "failed: "})
+        EXPECT_NE(o.out.find(words), std::string::npos) << words << " in\n" << o.out;
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 5) << "a heading and a row each:\n" << o.out;
+    EXPECT_EQ(listing(), (std::vector<std::string>{"assets.json", "in", "levels.etree", "levels.json", "one.etree"}));
+    EXPECT_EQ(Json::parse(run({"info", file("one.etree"), "--json"}).out)["asked"]["ellipsoids"], 1);
+    const Json levels = Json::parse(run({"info", file("levels.etree"), "--json"}).out);
+    EXPECT_EQ(levels["asked"]["levels"], 1) << "an entry's count replaces the defaults' one";
+    EXPECT_EQ(levels["asked"]["ellipsoids"], 0);
+    EXPECT_EQ(levels["degree"], 3);
+    EXPECT_EQ(levels["quality"], "fast");
+    EXPECT_EQ(Json::parse(read(file("levels.json")))["degree"], 3);
+
+    write(folder_ / "in/broken.obj", good);
+    const Outcome second = run({"bake", "--manifest", manifest, "--json", "--report", file("summary.json")});
+    EXPECT_EQ(second.code, 1);
+    const Json summary = Json::parse(second.out);
+    EXPECT_EQ(summary, Json::parse(read(file("summary.json"))));
+    EXPECT_EQ(summary["baked"], 1);
+    EXPECT_EQ(summary["unchanged"], 2);
+    EXPECT_EQ(summary["cached"], 0);
+    EXPECT_EQ(summary["failed"], 1);
+    EXPECT_EQ(summary["not_done"], 0);
+    ASSERT_EQ(summary["assets"].size(), 4u);
+    EXPECT_EQ(summary["assets"][0]["asset"], 1);
+    EXPECT_EQ(summary["assets"][0]["source"], "unchanged");
+    EXPECT_EQ(summary["assets"][1]["source"], "baked");
+    EXPECT_EQ(summary["assets"][1]["levels"].back()["covered"], true);
+    EXPECT_NE(summary["assets"][2]["error"].get<std::string>().find("No such file"), std::string::npos);
+    EXPECT_FALSE(summary["assets"][0].contains("error"));
+
+    write(folder_ / "in/missing.obj", good);
+    EXPECT_EQ(run({"bake", "--manifest", manifest}).code, 0);
+    const Outcome forced = run({"bake", "--manifest", manifest, "--force", "--threads", "1", "--json"});
+    EXPECT_EQ(forced.code, 0) << forced.err;
+    EXPECT_EQ(Json::parse(forced.out)["baked"], 4);
+}
+
+TEST_F(Cli, BadEntriesAreToldInOneLineEach) {
+    write(folder_ / "cube.obj", obj_text(cube()));
+    const struct {
+        const char *entry, *words;
+    } cases[] = {
+        {R"({"mesh": "cube.obj", "output": "a.etree", "levels": 1, "quality": "fast"})", nullptr},
+        {R"({"mesh": "cube.obj", "output": "./a.etree"})", "is the output of asset 1"},
+        {R"({"mesh": "cube.obj", "output": "b.etree", "report": "a.etree"})", "is the output of asset 1"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "levles": 2})",
+         R"(unknown key "levles" (did you mean "levels"?))"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "help": true})", R"(unknown key "help")"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "json": true})", R"(unknown key "json")"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "levels": "2"})", R"("levels" must be a whole number)"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "levels": 2.5})", R"("levels" must be a whole number)"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "levels": -1})", R"("levels" must be a whole number)"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "levels": 99999999999})", "levels"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "alpha": true})", R"("alpha" must be a number)"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "quality": 3})", R"("quality" must be a text)"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "quality": "superb"})", "no such quality"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "exact": 1})", R"("exact" must be true or false)"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "degree": 1})", "degree must be 2 to 64"},
+        {R"({"mesh": "cube.obj", "output": "c.etree", "levels": 2, "tolerance": 0.1})", "only one"},
+        {R"({"mesh": "cube.obj", "output": "cube.obj"})", "is the mesh of asset 1"},
+        {R"({"mesh": "cube.obj", "output": "assets.json"})", "is the manifest"},
+        {R"({"mesh": "cube.obj", "output": "-"})", "standard output"},
+        {R"({"mesh": "cube.obj", "output": "nowhere/c.etree"})", "does not exist"},
+        {R"({"mesh": "cube.obj"})", R"("output" is missing)"},
+        {R"({"output": "c.etree"})", R"("mesh" is missing)"},
+        {R"({"mesh": "", "output": "c.etree"})", R"("mesh" must not be empty)"},
+        {R"({"mesh": null, "output": "c.etree"})", R"("mesh" must be a text)"},
+        {R"(7)", "must be an object"},
+    };
+    std::string text;
+    for (const auto& c : cases) text += (text.empty() ? "" : ",\n") + std::string(c.entry);
+    const Outcome o = run({"bake", "--manifest", file("assets.json", "{\"assets\": [" + text + "]}"), "--json"});
+    EXPECT_EQ(o.code, 1);
+    const Json summary = Json::parse(o.out);
+    EXPECT_EQ(summary["baked"], 1);
+    EXPECT_EQ(summary["failed"], std::size(cases) - 1);
+    for (size_t i = 0; i < std::size(cases); ++i) {
+        SCOPED_TRACE(cases[i].entry);
+        const Json& asset = summary["assets"][i];
+        EXPECT_EQ(asset.contains("error"), cases[i].words != nullptr);
+        if (!cases[i].words) continue;
+        EXPECT_NE(asset.value("error", "").find(cases[i].words), std::string::npos) << asset;
+        const std::string index = "prolate: asset " + std::to_string(i + 1) + " (";
+        ASSERT_NE(o.err.find(index), std::string::npos) << o.err;
+        const std::string line =
+            o.err.substr(o.err.find(index), o.err.find('\n', o.err.find(index)) - o.err.find(index));
+        EXPECT_NE(line.find(cases[i].words), std::string::npos) << line;
+        EXPECT_NE(line.find("; "), std::string::npos) << "says what to do: " << line;
+    }
+    EXPECT_EQ(listing(), (std::vector<std::string>{"a.etree", "assets.json", "cube.obj"}));
+}
+
+TEST_F(Cli, ABadManifestIsRefusedAsAWhole) {
+    const auto refuse = [this](const char* text, int code, const std::string& words) {
+        SCOPED_TRACE(text);
+        const std::string path = file("assets.json", text);
+        expect_failure(run({"bake", "--manifest", path}), code, path, words);
+    };
+    refuse("", 3, "is no JSON");
+    refuse(R"({"assets": [})", 3, "line 1");
+    refuse(R"([])", 3, R"(must be an object with an array "assets")");
+    refuse(R"({"assets": {}})", 3, R"(must be an object with an array "assets")");
+    refuse(R"({"assets": [], "default": {}})", 3, R"(did you mean "defaults"?)");
+    refuse(R"({"assets": [], "defaults": []})", 3, R"("defaults" must be an object)");
+    refuse(R"({"assets": [], "defaults": {"levles": 1}})", 3, R"(defaults: unknown key "levles")");
+    refuse(R"({"assets": [], "defaults": {"output": "a"}})", 3, R"("output" belongs to each asset)");
+    const std::string empty = file("assets.json", R"({"assets": []})");
+    EXPECT_EQ(run({"bake", "--manifest", empty}).code, 0);
+    expect_failure(run({"bake", "--manifest", file("none.json")}), 4, file("none.json"), "No such file");
+    expect_failure(run({"bake", "--manifest", empty, "--levels", "2"}), 2, "--levels", "in the manifest");
+    expect_failure(run({"bake", shared("peanut.obj"), "--manifest", empty}), 2, "mesh", "in the manifest");
+    expect_failure(run({"bake"}), 2, "bake", "no mesh");
+}
+
+TEST_F(Cli, CtrlCInAManifestKeepsWhatIsDone) {
+    write(folder_ / "cube.obj", obj_text(cube()));
+    write(folder_ / "large.obj", obj_text(peanut(60)));
+    const std::string manifest = file("assets.json", R"({"assets": [
+        {"mesh": "cube.obj", "output": "cube.etree", "levels": 1, "quality": "fast"},
+        {"mesh": "large.obj", "output": "large.etree", "quality": "best", "ellipsoids": 20000},
+        {"mesh": "cube.obj", "output": "last.etree", "levels": 1, "quality": "fast"}]})");
+    RunOptions interrupt;
+    interrupt.interrupt_when = [this] { return fs::exists(folder_ / "cube.etree"); };
+    const Outcome o = run({"bake", "--manifest", manifest, "--json"}, interrupt);
+    EXPECT_EQ(o.code, 130) << o.err;
+    EXPECT_NE(o.err.find("2 of 3 assets not done"), std::string::npos) << o.err;
+    EXPECT_EQ(listing(), (std::vector<std::string>{"assets.json", "cube.etree", "cube.obj", "large.obj"}));
+    const Json summary = Json::parse(o.out);
+    EXPECT_EQ(summary["baked"], 1);
+    EXPECT_EQ(summary["not_done"], 2);
+    EXPECT_NE(summary["assets"][2]["error"].get<std::string>().find("interrupted"), std::string::npos);
+    EXPECT_EQ(run({"verify", file("cube.etree"), file("cube.obj")}).code, 0);
+}
+
 // ---- reading trees ----
 
 TEST_F(Cli, BadTreesAreRefusedByEveryCommand) {
     const std::string good = read(shared("peanut.etree"));
-    std::string newer = good, broken = good;
+    std::string newer = good, older = good, broken = good;
     newer[8] = 99;
+    older[8] = 1;
     broken[broken.size() - 20] ^= 1;
     fs::create_directory(folder_ / "folder.etree");
     const struct {
@@ -376,6 +836,7 @@ TEST_F(Cli, BadTreesAreRefusedByEveryCommand) {
                  {file("empty.etree", ""), 3, "empty"},
                  {file("foreign.etree", "this is not a tree"), 3, "not an .etree"},
                  {file("newer.etree", newer), 3, "newer format version than this library reads (version 99)"},
+                 {file("older.etree", older), 3, "older format version than this library reads"},
                  {file("broken.etree", broken), 3, "prolate bake"},
                  {file("cut.etree", good.substr(0, good.size() - 1)), 3, "prolate bake"}};
     const auto before = listing();
@@ -400,6 +861,13 @@ TEST_F(Cli, InfoTellsWhatIsThere) {
     const Json report = Json::parse(read(shared("report.json")));
     EXPECT_EQ(info["source_hash"], report["source_hash"]);
     EXPECT_EQ(info["nodes"], report["nodes"]);
+    for (size_t l = 0; l < 3; ++l)
+        for (const auto& [key, value] : report["levels"][l].items())
+            if (key != "seconds" && key != "nodes" && key != "bytes") {
+                EXPECT_EQ(info["levels"][l][key], value) << key;
+            }
+    EXPECT_NE(text.out.find("+/-"), std::string::npos) << text.out;
+    EXPECT_EQ(text.out.find("seconds"), std::string::npos) << "that is not in the file: " << text.out;
 
     const std::string whole = read(shared("peanut.etree"));
     const Outcome prefix = run({"info", file("prefix.etree", whole.substr(0, info["levels"][1]["end_byte"]))});

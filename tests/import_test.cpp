@@ -153,6 +153,31 @@ TEST_F(Import, ReadsObjVariants) {
     EXPECT_EQ(quads.triangles.size(), 2u) << "polygons become triangles; points and lines are left out";
 }
 
+TEST_F(Import, AFilesHashStandsForItsMesh) {
+    const auto hash = [](const std::string& path) { return hash_mesh_file(path.c_str()); };
+    const std::string path = write("a.obj", kObj);
+    ASSERT_TRUE(hash(path));
+    EXPECT_EQ(hash(path), hash(write("b.OBJ", kObj)));
+    EXPECT_NE(hash(path), hash(write("c.obj", std::string(kObj) + "\n")));
+    EXPECT_NE(hash(path), hash(write("d.ply", kObj))) << "another reader makes another mesh of it";
+    EXPECT_FALSE(hash((folder_ / "missing.obj").string()));
+    EXPECT_FALSE(hash(folder_.string()));
+
+    // A GLB holds its numbers itself, unless its JSON names a file; a .gltf may, so a mesh of it is read to be known.
+    const auto glb = [this](const std::string& name, const std::string& json, const std::string& rest) {
+        std::string bytes = "glTF0123abcd"; // the header's numbers do not matter here
+        const auto length = static_cast<uint32_t>(json.size());
+        bytes.append(reinterpret_cast<const char*>(&length), sizeof length);
+        return write(name, bytes + "JSON" + json + rest);
+    };
+    EXPECT_TRUE(hash(glb("a.glb", R"({"buffers": [{"byteLength": 8}]})", "numbers with uri and \\ by chance")));
+    EXPECT_FALSE(hash(glb("b.glb", R"({"buffers": [{"uri": "a.bin"}]})", "")));
+    EXPECT_FALSE(hash(glb("c.glb", R"({"buffers": [{"\u0075ri": "a.bin"}]})", "")));
+    EXPECT_FALSE(hash(write("short.glb", "glTF0123abcd")));
+    EXPECT_FALSE(hash(write("a.gltf", R"({"buffers": [{"uri": "a.bin"}]})")));
+    EXPECT_TRUE(hash(write("b.gltf", R"({"buffers": []})")));
+}
+
 TEST_F(Import, RefusesDamagedObj) {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     expect_refused(write("a.obj", vertices + "f 1 2"), ErrorCode::bad_file, "line 4");

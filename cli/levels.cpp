@@ -1,0 +1,128 @@
+#include "cli/levels.hpp"
+
+#include "cli/grouped.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdlib>
+
+namespace prolate::cli {
+namespace {
+
+// The file holds floats: the shortest decimal number that gives the same float, instead of all digits of a double.
+double shortest(double value) {
+    return std::isfinite(value) ? std::strtod(fmt::format("{}", static_cast<float>(value)).c_str(), nullptr) : value;
+}
+
+std::string known(const char* format, double value) {
+    return std::isnan(value) ? "-" : fmt::format(fmt::runtime(format), value);
+}
+
+double percent(double length, double diagonal) {
+    return diagonal > 0 ? 100 * length / diagonal : LevelFigures::kUnknown;
+}
+
+} // namespace
+
+const char* const kLevelTableHelp = R"(
+The table has a row for each level. Its figures are those of the cut: the nodes of that level and the leaves above it,
+as they are in the file. Every cut covers the solid; that of an exact tree covers its surface, and has no figures.
+  outside ratio  volume of the cut outside the solid / volume of the solid
+  +/-            estimated error of that ratio
+  singly         the same ratio, summed over the ellipsoids as if each were alone: counts overlaps
+  E_sur          largest radial distance between an ellipsoid and the surface points that it stands for
+  H              distance from the cover to the solid (one-sided Hausdorff; of an open mesh, to its triangles): none of
+                 the cover is farther than the maximum; mean and 99th percentile are over its surface
+E_sur and H are in percent of the diagonal of the mesh's bounding box.)";
+
+uint32_t cut_size(const TreeView& tree, uint32_t level) {
+    uint32_t count = 0;
+    tree.for_each_in_cut(level, [&count](uint32_t) { ++count; });
+    return count;
+}
+
+std::string level_table(const TreeView& tree, std::span<const double> seconds) {
+    const BakeInfo info = tree.bake_info();
+    std::string out = fmt::format("{:>26}{:>32}\n", "outside ratio", "% of the diagonal");
+    out +=
+        fmt::format("level {:>7} {:>8} {:>6} {:>8} {:>7} {:>7} {:>7} {:>7} {:>7} {:>11}{}\n", "nodes", "union", "+/-",
+                    "singly", "E_sur", "H max", "mean", "99 %", "covered", "bytes", seconds.empty() ? "" : "  seconds");
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        const LevelInfo level = tree.level(l);
+        const auto share = [&](double length) { return known("{:.3f}", percent(length, info.diagonal)); };
+        out += fmt::format("{:>5} {:>7} {:>8} {:>6} {:>8} {:>7} {:>7} {:>7} {:>7} {:>7} {:>11}", l,
+                           grouped(cut_size(tree, l)), known("{:.4f}", level.outside_ratio),
+                           known("{:.0e}", level.outside_ratio_error), known("{:.3f}", level.sum_outside_ratio),
+                           share(level.surface_error), share(level.hausdorff_max), share(level.hausdorff_mean),
+                           share(level.hausdorff_p99), info.proved ? "proved" : "-", grouped(level.end_byte));
+        out += l < seconds.size() ? fmt::format(" {:>8.2f}\n", seconds[l]) : "\n";
+    }
+    if (tree.has_triangles())
+        out += fmt::format("with {} triangles {:>82}\n", grouped(tree.triangle_count()), grouped(tree.bytes().size()));
+    return out;
+}
+
+nlohmann::ordered_json level_json(const TreeView& tree, uint32_t l) {
+    const LevelInfo level = tree.level(l);
+    const BakeInfo info = tree.bake_info();
+    const auto share = [&](double length) { return shortest(percent(length, info.diagonal)); };
+    return {{"outside_ratio", shortest(level.outside_ratio)},
+            {"outside_ratio_error", shortest(level.outside_ratio_error)},
+            {"sum_outside_ratio", shortest(level.sum_outside_ratio)},
+            {"union_volume", level.union_volume},
+            {"surface_error", shortest(level.surface_error)},
+            {"hausdorff_max", shortest(level.hausdorff_max)},
+            {"hausdorff_mean", shortest(level.hausdorff_mean)},
+            {"hausdorff_p99", shortest(level.hausdorff_p99)},
+            {"percent_of_diagonal",
+             {{"surface_error", share(level.surface_error)},
+              {"hausdorff_max", share(level.hausdorff_max)},
+              {"hausdorff_mean", share(level.hausdorff_mean)},
+              {"hausdorff_p99", share(level.hausdorff_p99)}}},
+            {"covered", info.proved}};
+}
+
+nlohmann::ordered_json header_json(const TreeView& tree) {
+    const BakeInfo info = tree.bake_info();
+    nlohmann::ordered_json out;
+    out["bytes"] = tree.bytes().size();
+    out["nodes"] = tree.node_count();
+    out["degree"] = tree.degree();
+    out["exact"] = info.exact;
+    out["triangles"] = tree.triangle_count(); // 0 in a prefix, as the next two
+    out["vertices"] = tree.vertex_count();
+    out["components"] = tree.component_count();
+    out["method"] = name_of(info.method);
+    out["primitive"] = name_of(info.primitive);
+    out["quality"] = name_of(info.quality);
+    out["alpha"] = shortest(info.alpha);
+    out["beta"] = shortest(info.beta);
+    out["seed"] = info.seed;
+    out["asked"] = {{"levels", info.levels}, {"ellipsoids", info.ellipsoids}, {"tolerance", shortest(info.tolerance)}};
+    out["goal_reached"] = info.goal_reached;
+    out["source_hash"] = fmt::format("{:016x}", info.source_hash);
+    out["options_hash"] = fmt::format("{:016x}", info.options_hash);
+    out["surface_mode"] = info.surface_mode;
+    out["solid_volume"] = info.solid_volume;
+    out["solid_volume_error"] = shortest(info.solid_volume * double{info.solid_volume_error});
+    out["diagonal"] = info.diagonal;
+    out["resolution"] = info.resolution;
+    return out;
+}
+
+std::string text_of(const nlohmann::ordered_json& json) {
+    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+}
+
+const char* name_of(Method method) {
+    return method == Method::voxel ? "voxel" : "analytic";
+}
+const char* name_of(Primitive primitive) {
+    return primitive == Primitive::ellipsoid ? "ellipsoid" : "sphere";
+}
+const char* name_of(Quality quality) {
+    return quality == Quality::fast ? "fast" : quality == Quality::normal ? "normal" : "best";
+}
+
+} // namespace prolate::cli
