@@ -3,6 +3,7 @@
 #include "builder/random.hpp"
 #include "builder/winding.hpp"
 #include "src/format.hpp"
+#include "src/hash.hpp"
 #include "tests/shapes.hpp"
 
 #include <prolate/build.hpp>
@@ -10,7 +11,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <numbers>
 
 namespace prolate {
 namespace {
@@ -28,32 +32,55 @@ Build must_build(const Mesh& mesh, const BuildOptions& options) {
     return std::move(*built);
 }
 
-// An independent look: random points of the solid against each level.
+// A cut through the tree that takes some nodes and, instead of others, their children, and so on.
+std::vector<Fit> random_cut(const TreeView& tree, double go_on, Random& random) {
+    std::vector<Fit> out;
+    std::vector<uint32_t> todo{0};
+    while (!todo.empty()) {
+        const uint32_t node = todo.back();
+        todo.pop_back();
+        const ChildRange children = tree.children(node);
+        if (children.count == 0 || random.uniform() >= go_on)
+            out.emplace_back(tree.ellipsoid(node));
+        else
+            for (uint32_t c = 0; c < children.count; ++c) todo.push_back(children.first + c);
+    }
+    return out;
+}
+
+// An independent look: random points of the solid against each level, and against cuts across the levels.
 void expect_covered(const Mesh& mesh, const Build& built) {
+    const TreeView tree = built.tree.view();
     const Winding winding(mesh.view());
     Box box;
     for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
     Random random(4);
-    for (uint32_t l = 0; l < built.tree.view().level_count(); ++l) {
-        std::vector<Fit> fits;
-        built.tree.view().for_each_in_cut(l, [&](uint32_t n) { fits.emplace_back(built.tree.view().ellipsoid(n)); });
-        const auto covered = [&](const Vec& p) {
-            return std::any_of(fits.begin(), fits.end(), [&](const Fit& f) { return f.radial_squared(p) <= 1; });
-        };
-        for (const Triangle& t : mesh.triangles) {
-            double u = random.uniform(), v = random.uniform();
-            if (u + v > 1) u = 1 - u, v = 1 - v;
-            const Vec a = to_vec(mesh.vertices[t[0]]), b = to_vec(mesh.vertices[t[1]]), c = to_vec(mesh.vertices[t[2]]);
-            EXPECT_TRUE(covered(a + u * (b - a) + v * (c - a))) << "level " << l;
-            EXPECT_TRUE(covered(a)) << "level " << l;
-        }
-        for (int i = 0; i < 3000; ++i) {
-            const Vec p = box.low + Vec(random.uniform(), random.uniform(), random.uniform()).cwiseProduct(box.size());
-            if (!built.surface_mode && std::abs(winding(p)) > 0.75) {
-                EXPECT_TRUE(covered(p)) << "level " << l;
-            }
-        }
+    std::vector<Vec> points;
+    const size_t stride = std::max<size_t>(1, mesh.triangles.size() / 3000);
+    for (size_t i = 0; i < mesh.triangles.size(); i += stride) {
+        const Triangle& t = mesh.triangles[i];
+        double u = random.uniform(), v = random.uniform();
+        if (u + v > 1) u = 1 - u, v = 1 - v;
+        const Vec a = to_vec(mesh.vertices[t[0]]), b = to_vec(mesh.vertices[t[1]]), c = to_vec(mesh.vertices[t[2]]);
+        points.push_back(a + u * (b - a) + v * (c - a));
+        points.push_back(a);
     }
+    for (int i = 0; i < 3000 && !built.surface_mode; ++i) {
+        const double x = random.uniform(), y = random.uniform(), z = random.uniform();
+        const Vec p = box.low + Vec(x, y, z).cwiseProduct(box.size());
+        if (std::abs(winding(p)) > 0.75) points.push_back(p);
+    }
+    const auto expect_covers = [&](const std::vector<Fit>& cut) {
+        for (const Vec& p : points)
+            EXPECT_TRUE(std::ranges::any_of(cut, [&](const Fit& f) { return f.radial_squared(p) <= 1; }))
+                << p.transpose() << " of a cut of " << cut.size();
+    };
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        std::vector<Fit> cut;
+        tree.for_each_in_cut(l, [&](uint32_t n) { cut.emplace_back(tree.ellipsoid(n)); });
+        expect_covers(cut);
+    }
+    for (const double go_on : {0.3, 0.5, 0.7, 0.7, 0.9, 0.9}) expect_covers(random_cut(tree, go_on, random));
 }
 
 void expect_proved(const Mesh& mesh, const Build& built) {
@@ -73,7 +100,11 @@ void PrintTo(const Model& model, std::ostream* out) {
 
 class BuildOf : public testing::TestWithParam<Model> {};
 
-TEST_P(BuildOf, CoversEveryLevel) {
+bool is_ball(const Ellipsoid& e) {
+    return e.l11 == e.l22 && e.l22 == e.l33 && e.l21 == 0 && e.l31 == 0 && e.l32 == 0;
+}
+
+TEST_P(BuildOf, CoversEveryCut) {
     const Mesh& mesh = GetParam().mesh;
     const Build built = must_build(mesh, quick());
     EXPECT_EQ(built.levels.size(), built.tree.view().level_count());
@@ -85,22 +116,20 @@ TEST_P(BuildOf, CoversEveryLevel) {
         }
 }
 
-Mesh two_pieces() {
-    Mesh mesh = shapes::icosphere(2);
-    shapes::append(mesh, shapes::moved(shapes::icosphere(2), {5, 0, 0}, 0.5f));
-    return mesh;
-}
-
-Mesh hollow_ball() {
-    Mesh mesh = shapes::icosphere(3);
-    shapes::append(mesh, shapes::inverted(shapes::moved(shapes::icosphere(3), {}, 0.8f)));
-    return mesh;
-}
-
-Mesh open_box() {
-    Mesh mesh = shapes::box();
-    mesh.triangles.resize(10);
-    return mesh;
+// The same with balls, and a tree that grows from its leaves.
+TEST_P(BuildOf, CoversWithSpheresOfAGivenNumber) {
+    const Mesh& mesh = GetParam().mesh;
+    BuildOptions options = quick(0);
+    options.ellipsoids = 21;
+    options.degree = 3;
+    options.primitive = Primitive::sphere;
+    const Build built = must_build(mesh, options);
+    EXPECT_EQ(built.levels.back().nodes, 21u);
+    EXPECT_EQ(built.levels.size(), 4u); // 27 would fit
+    expect_proved(mesh, built);
+    expect_covered(mesh, built);
+    for (uint32_t n = 0; n < built.tree.view().node_count(); ++n)
+        EXPECT_TRUE(is_ball(built.tree.view().ellipsoid(n))) << n;
 }
 
 Mesh dust() { // more separate parts than initial pieces
@@ -113,15 +142,65 @@ Mesh dust() { // more separate parts than initial pieces
     return mesh;
 }
 
+Mesh overlapping() { // two balls and a box that cross each other
+    Mesh mesh = shapes::icosphere(2);
+    shapes::append(mesh, shapes::moved(shapes::icosphere(2), {1, 0.3f, 0}));
+    shapes::append(mesh, shapes::moved(shapes::box(2, 0.2f, 0.2f), {-0.5f, 0, 0.5f}));
+    return mesh;
+}
+
+Mesh duplicated() { // each triangle twice, corners not shared
+    const Mesh once = shapes::torus(1, 0.3f, 24, 12);
+    Mesh mesh = once;
+    shapes::append(mesh, once);
+    return mesh;
+}
+
+Mesh half_inverted() { // separate parts, one inside out
+    Mesh mesh = shapes::box(1, 1, 1);
+    shapes::append(mesh, shapes::inverted(shapes::moved(shapes::box(1, 2, 1), {2, 0, 0})));
+    return mesh;
+}
+
+Mesh needles() { // an open fan of very thin triangles, and a closed spike
+    Mesh mesh{{{0, 0, 0}}, {}};
+    for (uint32_t i = 0; i < 40; ++i) {
+        const float angle = 0.15f * static_cast<float>(i);
+        mesh.vertices.push_back({std::cos(angle), std::sin(angle), 0.1f});
+        mesh.vertices.push_back({std::cos(angle + 1e-4f), std::sin(angle + 1e-4f), 0.1f});
+        mesh.triangles.push_back({0, 2 * i + 1, 2 * i + 2});
+    }
+    shapes::append(mesh, shapes::moved(shapes::box(1e-4f, 1e-4f, 2), {0, 0, -1}));
+    return mesh;
+}
+
+Mesh gashed() { // open: its inside fades
+    Mesh mesh = shapes::torus(1, 0.3f, 32, 16);
+    std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] % 16 < 3; });
+    return mesh;
+}
+
+Mesh shells() { // one in another, alternating
+    Mesh mesh;
+    for (const float radius : {1.0f, 0.7f, 0.4f})
+        shapes::append(mesh, radius == 0.7f ? shapes::inverted(shapes::moved(shapes::icosphere(2), {}, radius))
+                                            : shapes::moved(shapes::icosphere(2), {}, radius));
+    return mesh;
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Meshes, BuildOf,
     testing::Values(Model{"torus", shapes::torus(1, 0.3f, 48, 24)}, Model{"box", shapes::box(1, 2, 3)},
                     Model{"tetrahedron", shapes::tetrahedron()},
-                    Model{"inside_out", shapes::inverted(shapes::icosphere(3))}, Model{"hollow", hollow_ball()},
-                    Model{"two_pieces", two_pieces()},
+                    Model{"inside_out", shapes::inverted(shapes::icosphere(3))}, Model{"hollow", shapes::hollow_ball()},
+                    Model{"two_pieces", shapes::two_pieces()},
                     Model{"plate", shapes::box(1, 1, 0.001f)}, // far thinner than a cell
                     Model{"needle", shapes::box(1, 0.001f, 0.001f)}, Model{"sheet", shapes::sheet(1, 1, 8)},
-                    Model{"open_box", open_box()}, Model{"dust", dust()},
+                    Model{"open_box", shapes::open_box()}, Model{"dust", dust()}, Model{"overlapping", overlapping()},
+                    Model{"duplicated", duplicated()}, Model{"half_inverted", half_inverted()},
+                    Model{"needles", needles()}, Model{"gashed", gashed()}, Model{"shells", shells()},
+                    Model{"coplanar", shapes::box(1, 1, 0)},
+                    Model{"millimetres", shapes::moved(overlapping(), {}, 1e3f)},
                     Model{"one_triangle", Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}},
                     Model{"micrometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e-6f)},
                     Model{"kilometres", shapes::moved(shapes::torus(1, 0.3f, 24, 12), {}, 1e6f)},
@@ -129,8 +208,8 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& model) { return std::string(model.param.name); });
 
 TEST(Build, SurfaceModeIsAnnounced) {
-    EXPECT_TRUE(must_build(open_box(), quick(1)).surface_mode);
-    EXPECT_TRUE(must_build(open_box(), quick(1)).tree.view().bake_info().surface_mode);
+    EXPECT_TRUE(must_build(shapes::open_box(), quick(1)).surface_mode);
+    EXPECT_TRUE(must_build(shapes::open_box(), quick(1)).tree.view().bake_info().surface_mode);
     EXPECT_FALSE(must_build(shapes::box(), quick(1)).surface_mode);
 }
 
@@ -151,15 +230,132 @@ TEST(Build, SameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(other.tree.view().bake_info().source_hash, one.tree.view().bake_info().source_hash);
 }
 
-TEST(Build, CountsAreExact) {
+TEST(Build, FiguresAreThoseOfTheFile) {
     const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
-    for (const uint32_t count : {1u, 2u, 7u, 20u, 33u}) {
+    const Build built = must_build(mesh, quick());
+    const TreeView tree = built.tree.view();
+    const BakeInfo info = tree.bake_info();
+    EXPECT_TRUE(info.proved);
+    EXPECT_TRUE(info.goal_reached);
+    EXPECT_EQ(info.solid_volume, built.solid_volume);
+    EXPECT_EQ(info.diagonal, built.diagonal);
+    EXPECT_LE(std::abs(built.solid_volume - shapes::enclosed_volume(mesh)), built.solid_volume_error);
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        const LevelFigures &file = tree.level(l), &report = built.levels[l];
+        EXPECT_EQ(file.union_volume, report.union_volume);
+        for (const auto figure :
+             {&LevelFigures::outside_ratio, &LevelFigures::outside_ratio_error, &LevelFigures::sum_outside_ratio,
+              &LevelFigures::surface_error, &LevelFigures::hausdorff_max, &LevelFigures::hausdorff_mean,
+              &LevelFigures::hausdorff_p99}) {
+            EXPECT_EQ(file.*figure, static_cast<float>(report.*figure));
+            EXPECT_TRUE(std::isfinite(file.*figure));
+        }
+        EXPECT_LT(report.outside_ratio_error, 1e-3);
+        // Of a cover: what is outside is the union less the solid; alone, each sticks out by more in sum.
+        EXPECT_NEAR(report.outside_ratio, report.union_volume / built.solid_volume - 1, report.outside_ratio_error);
+        EXPECT_GE(report.sum_outside_ratio, report.outside_ratio);
+        EXPECT_GT(report.hausdorff_mean, 0);
+        EXPECT_GT(report.hausdorff_p99, report.hausdorff_mean);
+        EXPECT_GT(report.hausdorff_max, report.hausdorff_p99);
+    }
+    // The root's poles are the farthest from the ring.
+    EXPECT_NEAR(built.levels[0].hausdorff_max, std::hypot(1, tree.ellipsoid(0).l33) - 0.3, 0.01);
+    // The root's own outside volume is that of its decoded ellipsoid.
+    EXPECT_NEAR(built.levels[0].sum_outside_ratio, volume(tree.ellipsoid(0)) / built.solid_volume - 1,
+                built.levels[0].outside_ratio_error);
+}
+
+// If this fails because the algorithm has changed: increment kBuilderVersion and put the new hash here. Caches take
+// equal versions for equal bytes.
+TEST(Build, BytesChangeOnlyWithTheBuildersVersion) {
+    const Build built = must_build(shapes::torus(1, 0.3f, 24, 12), quick(1));
+    EXPECT_EQ(kBuilderVersion, 3u);
+    EXPECT_EQ(hash_bytes(built.tree.bytes()), 8879677852444613718u);
+}
+
+TEST(Build, CountsAreExact) {
+    const Mesh flat{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+    for (const Mesh& mesh : {shapes::torus(1, 0.3f, 48, 24), shapes::tetrahedron(), flat})
+        for (const uint32_t count : {1u, 2u, 7u, 33u, 64u}) {
+            BuildOptions options = quick(0);
+            options.ellipsoids = count;
+            const Build built = must_build(mesh, options);
+            EXPECT_TRUE(built.goal_reached);
+            EXPECT_EQ(built.levels.back().nodes, count);
+            uint32_t leaves = 0;
+            for (uint32_t n = 0; n < built.tree.view().node_count(); ++n) leaves += built.tree.view().is_leaf(n);
+            EXPECT_EQ(leaves, count);
+            expect_proved(mesh, built);
+            expect_covered(mesh, built);
+        }
+}
+
+TEST(Build, LevelsHaveUpToDegreeChildren) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
+    for (const uint32_t degree : {5u, 6u}) {
+        BuildOptions options = quick(3);
+        options.degree = degree;
+        const Build built = must_build(mesh, options);
+        const TreeView tree = built.tree.view();
+        EXPECT_EQ(tree.level_count(), 4u);
+        for (uint32_t n = 0; n < tree.node_count(); ++n) EXPECT_LE(tree.children(n).count, degree);
+        for (uint32_t l = 1; l < 4; ++l) {
+            EXPECT_LT(built.levels[l].outside_ratio, built.levels[l - 1].outside_ratio);
+            EXPECT_GT(built.levels[l].nodes, 0.6 * std::pow(degree, l));
+        }
+        expect_covered(mesh, built);
+    }
+}
+
+TEST(Build, OneNodeFitsAnEllipsoidTightly) {
+    Mesh mesh = shapes::icosphere(4);
+    for (Vec3& v : mesh.vertices) v = {2 * v.x + 0.5f * v.y + 7, v.y - 0.2f * v.z, 0.4f * v.z + 0.3f * v.x};
+    for (const Method method : {Method::voxel, Method::analytic}) {
+        BuildOptions options = quick(0);
+        options.ellipsoids = 1;
+        options.method = method;
+        const Build built = must_build(mesh, options);
+        EXPECT_LT(built.levels[0].outside_ratio, 0.02); // 0.003 of which the mesh is smaller than its own ellipsoid
+        EXPECT_GT(built.levels[0].outside_ratio, 0.002);
+    }
+}
+
+TEST(Build, LeavesOfSimpleShapesAreTight) {
+    const auto ratio = [](const Mesh& mesh, uint32_t count, Primitive primitive = Primitive::ellipsoid) {
         BuildOptions options = quick(0);
         options.ellipsoids = count;
+        options.primitive = primitive;
         const Build built = must_build(mesh, options);
-        EXPECT_TRUE(built.goal_reached);
-        EXPECT_EQ(built.levels.back().nodes, count);
         expect_proved(mesh, built);
+        return built.levels.back().outside_ratio;
+    };
+    Mesh balls = shapes::icosphere(3);
+    shapes::append(balls, shapes::moved(shapes::icosphere(3), {3, 1, 0}, 0.5f));
+    EXPECT_LT(ratio(balls, 2), 0.06);
+    EXPECT_LT(ratio(balls, 2, Primitive::sphere), 0.06);
+    EXPECT_LT(ratio(shapes::torus(1, 0.3f, 48, 24), 8), 0.3);
+    EXPECT_LT(ratio(shapes::torus(1, 0.3f, 48, 24), 8, Primitive::sphere), 1.6);
+    // The smallest ellipsoid around a cube has pi / 2 * sqrt(3) times its volume.
+    const double around_a_cube = std::numbers::pi / 2 * std::sqrt(3.0) - 1;
+    EXPECT_NEAR(ratio(shapes::box(), 1), around_a_cube, 0.02);
+    EXPECT_NEAR(ratio(shapes::box(), 1, Primitive::sphere), around_a_cube, 0.02);
+    EXPECT_LT(ratio(shapes::box(), 8), 0.6 * around_a_cube);
+}
+
+TEST(Build, AnalyticMethodNeedsAClosedMeshThatDoesNotOverlap) {
+    BuildOptions options = quick(1);
+    options.method = Method::analytic;
+    for (const Mesh& mesh : {shapes::torus(1, 0.3f, 24, 12), shapes::inverted(shapes::icosphere(2)), shells()}) {
+        const Build built = must_build(mesh, options);
+        EXPECT_EQ(built.tree.view().bake_info().method, Method::analytic);
+        EXPECT_LT(built.levels[1].outside_ratio, built.levels[0].outside_ratio);
+        expect_proved(mesh, built);
+        expect_covered(mesh, built);
+    }
+    for (const Mesh& mesh : {shapes::open_box(), overlapping(), half_inverted()}) {
+        const auto built = build(mesh.view(), options);
+        ASSERT_FALSE(built);
+        EXPECT_EQ(built.error().code, ErrorCode::bad_mesh);
     }
 }
 
@@ -202,8 +398,6 @@ TEST(Build, RefusesBadOptionsByName) {
     EXPECT_EQ(code([](BuildOptions& o) { o.tolerance = -1; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](BuildOptions& o) { o.tolerance = NAN; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](BuildOptions& o) { o.alpha = 0, o.beta = 0; }), ErrorCode::bad_options);
-    EXPECT_EQ(code([](BuildOptions& o) { o.method = Method::analytic; }), ErrorCode::unsupported);
-    EXPECT_EQ(code([](BuildOptions& o) { o.primitive = Primitive::sphere; }), ErrorCode::unsupported);
 }
 
 TEST(Build, ReportsProgressAndCanBeCancelled) {
@@ -358,7 +552,8 @@ TEST(Build, BeatsTheNaiveHierarchyOnRealMeshes) {
         options.quality = Quality::fast;
         const Build built = must_build(*mesh, options);
         for (size_t l = 0; l < 3; ++l) EXPECT_LE(built.levels[l + 1].outside_ratio, naive.ratio[l]) << naive.model;
-        EXPECT_LE(built.tree.bytes().size(), 128 + 4 * 32 + 24 * (1 + 8 + 64 + 512));
+        EXPECT_LE(built.tree.view().node_count(), 1u + 8 + 64 + 512);
+        EXPECT_LE(built.tree.bytes().size(), 1024 + kNodeBytes * built.tree.view().node_count());
     }
 }
 
