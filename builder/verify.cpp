@@ -36,6 +36,7 @@ constexpr double kSmallestBox = 1e-9;          // of the mesh's size: below, the
 constexpr uint64_t kPiecesPerTask = 4'000'000; // a bound on the work at hostile trees; real ones need about 10,000
 constexpr double kAccuracy = 3;                // of the winding number, see Winding
 constexpr int kTaskLevels = 3;                 // 8^3 boxes to share between threads
+constexpr size_t kFewCandidates = 6;           // up to so many are tried in pairs
 
 struct Shape {
     Fit fit;
@@ -70,6 +71,12 @@ public:
             corner_inside.fill(-1);
             for (const uint32_t c : cell.candidates)
                 if (holds_piece(shapes_[c], cell, corner_inside)) return true;
+            if (cell.candidates.size() <= kFewCandidates)
+                for (size_t b = 1; b < cell.candidates.size(); ++b)
+                    for (size_t a = 0; a < b; ++a)
+                        if (hold_parts(shapes_[cell.candidates[a]], shapes_[cell.candidates[b]], cell, corner_inside) ||
+                            !proof.covered)
+                            return true;
         }
         refute(cell);
         return !proof.covered;
@@ -148,6 +155,59 @@ private:
         return true;
     }
 
+    // Does `a` hold what is below, and `b` what is above the plane that is tangent, near the middle of the cell, to the
+    // surface of equal radial coordinates? The parts' corners are those of the cell, and where the plane cuts edges.
+    // A corner that neither holds may be the counterexample.
+    bool hold_parts(const Shape& a, const Shape& b, const Cell& cell, std::array<int8_t, 8>& corner_inside) {
+        for (const Polygon& polygon : cell.polygons)
+            for (const Vec& p : polygon)
+                if (!holds(a, p) && !holds(b, p)) return false;
+        Vec on_plane = cell.box.center(), normal;
+        for (int newton = 0; newton < 3; ++newton) {
+            const Vec from_a = a.fit.inverse * (on_plane - a.fit.center);
+            const Vec from_b = b.fit.inverse * (on_plane - b.fit.center);
+            normal = 2 * (a.fit.inverse.transpose() * from_a - b.fit.inverse.transpose() * from_b);
+            if (normal.squaredNorm() == 0) return false;
+            if (newton < 2) on_plane -= (from_a.squaredNorm() - from_b.squaredNorm()) / normal.squaredNorm() * normal;
+        }
+        const auto height = [&](const Vec& p) { return normal.dot(p - on_plane); };
+        const auto holds_own = [&](const Vec& p, double h) { return (h > 0 || holds(a, p)) && (h < 0 || holds(b, p)); };
+        const auto cut_of = [](const Vec& p, double h_p, const Vec& q, double h_q) -> Vec {
+            return p + h_p / (h_p - h_q) * (q - p);
+        };
+        for (const Polygon& polygon : cell.polygons) {
+            double last = height(polygon.back());
+            for (size_t i = 0; i < polygon.size(); ++i) {
+                const Vec &p = polygon[i], &before = polygon[i ? i - 1 : polygon.size() - 1];
+                const double h = height(p);
+                if (!holds_own(p, h)) return false;
+                if (h * last < 0)
+                    if (const Vec cut = cut_of(p, h, before, last); !holds_own(cut, 0)) {
+                        refute_at(cut, cell, [] { return true; });
+                        return false;
+                    }
+                last = h;
+            }
+        }
+        if (!winding_) return true;
+        std::array<double, 8> heights;
+        for (unsigned i = 0; i < 8; ++i) {
+            const Vec corner = cell.box.corner(i);
+            heights[i] = height(corner);
+            if (holds_own(corner, heights[i])) continue;
+            if (corner_inside[i] < 0) corner_inside[i] = inside(corner);
+            if (corner_inside[i]) return false;
+        }
+        for (unsigned i = 0; i < 8; ++i)
+            for (unsigned axis = 1; axis < 8; axis <<= 1) {
+                const unsigned j = i ^ axis;
+                if (i > j || !(heights[i] * heights[j] < 0)) continue;
+                const Vec cut = cut_of(cell.box.corner(i), heights[i], cell.box.corner(j), heights[j]);
+                if (!holds_own(cut, 0) && inside(cut)) return false;
+            }
+        return true;
+    }
+
     void drop_far_candidates(Cell& cell) const {
         const Vec center = cell.box.center();
         const double radius = 0.5 * cell.box.size().norm();
@@ -161,32 +221,34 @@ private:
         });
     }
 
-    // Looks for a point of the solid, among those at hand, that no ellipsoid contains, not even barely.
-    void refute(const Cell& cell) {
-        const auto check = [&](const Vec& p, auto&& is_solid) {
-            double nearest = HUGE_VAL;
-            for (const uint32_t c : cell.candidates) {
-                nearest = std::min(nearest, shapes_[c].fit.radial_squared(p));
-                if (nearest <= 1) return;
-            }
-            if (!is_solid()) return;
-            for (const Shape& shape : shapes_) nearest = std::min(nearest, shape.fit.radial_squared(p));
+    // A counterexample, if `p` is a point of the solid and no ellipsoid contains it, not even barely.
+    template <class InSolid> void refute_at(const Vec& p, const Cell& cell, InSolid&& in_solid) {
+        double nearest = HUGE_VAL;
+        for (const uint32_t c : cell.candidates) {
+            nearest = std::min(nearest, shapes_[c].fit.radial_squared(p));
             if (nearest <= 1) return;
-            proof.covered = false;
-            proof.has_counterexample = true;
-            std::copy_n(p.data(), 3, proof.point);
-            proof.depth = std::sqrt(nearest) - 1;
-        };
+        }
+        if (!in_solid()) return;
+        for (const Shape& shape : shapes_) nearest = std::min(nearest, shape.fit.radial_squared(p));
+        if (nearest <= 1) return;
+        proof.covered = false;
+        proof.has_counterexample = true;
+        std::copy_n(p.data(), 3, proof.point);
+        proof.depth = std::sqrt(nearest) - 1;
+    }
+
+    // Looks for a counterexample among the points at hand.
+    void refute(const Cell& cell) {
         for (const Polygon& polygon : cell.polygons)
             for (const Vec& p : polygon) {
-                check(p, [] { return true; });
+                refute_at(p, cell, [] { return true; });
                 if (!proof.covered) return;
             }
         if (!winding_) return;
         for (unsigned i = 0; i < 9 && proof.covered; ++i) {
             const Vec p = i < 8 ? cell.box.corner(i) : cell.box.center();
             // A point that close to 1/2 lies on the surface: as good a witness as any, but 3/4 leaves no doubt.
-            check(p, [&] { return std::abs(winding(p)) > 0.75; });
+            refute_at(p, cell, [&] { return std::abs(winding(p)) > 0.75; });
         }
     }
 

@@ -1,4 +1,5 @@
 // build() and verify(): cover at every level, for every kind of mesh; and that verify() finds what does not cover.
+#include "builder/descent.hpp"
 #include "builder/fit.hpp"
 #include "builder/random.hpp"
 #include "builder/winding.hpp"
@@ -533,6 +534,44 @@ TEST(Verify, FindsAHoleInTheMiddle) {
     EXPECT_FALSE(proof->levels[1].covered);
     EXPECT_TRUE(proof->levels[1].has_counterexample);
     EXPECT_LT(Vec(proof->levels[1].point[0], proof->levels[1].point[1], proof->levels[1].point[2]).norm(), 0.6);
+}
+
+TEST(Verify, DecidesALongSeamInAFewPieces) {
+    // Two balls over a square bar, askew, that meet a little outside of its edges, or a little inside.
+    constexpr double kOffset = 0.25;
+    constexpr float kWidth = 0.04f;
+    const double edge_squared = 0.5 * double{kWidth} * kWidth;
+    Random random(5);
+    for (int round = 0; round < 20; ++round) {
+        const Mat turn = random_rotation(random);
+        Mesh bar = shapes::box(0.9f, kWidth, kWidth);
+        for (Vec3& v : bar.vertices) {
+            const Vec turned = turn * (to_vec(v) - Vec(0.45, kWidth / 2, kWidth / 2));
+            v = {static_cast<float>(turned.x()), static_cast<float>(turned.y()), static_cast<float>(turned.z())};
+        }
+        for (const double excess : {0.3, -0.3}) {
+            const double radius = std::sqrt(kOffset * kOffset + edge_squared * (1 + excess));
+            std::vector<format::PackedLevel> levels(2);
+            const double low[3] = {-1, -1, -1}, high[3] = {1, 1, 1};
+            const format::Lattice lattice = format::lattice_for(low, high);
+            const auto ball = [&](const Vec& center, double r) {
+                format::PackedNode packed;
+                const double factor[6] = {r, 0, r, 0, 0, r};
+                format::quantise(packed, lattice, center.data(), factor);
+                return packed;
+            };
+            levels[0].nodes = {ball(Vec::Zero(), 1)};
+            levels[0].nodes[0].child_count = 2;
+            for (const double side : {-1.0, 1.0}) levels[1].nodes.push_back(ball(side * kOffset * turn.col(0), radius));
+            const auto tree = Tree::open(format::encode({}, 2, lattice, levels));
+            ASSERT_TRUE(tree);
+            const auto proof = verify(tree->view(), bar.view());
+            ASSERT_TRUE(proof);
+            EXPECT_EQ(proof->levels[1].covered, excess > 0) << round;
+            EXPECT_EQ(proof->levels[1].has_counterexample, excess < 0) << round;
+            EXPECT_LT(proof->levels[1].pieces, 3000u) << round;
+        }
+    }
 }
 
 // Outside ratios of the naive k-means + minimum-ellipsoid hierarchy, judged independently: ours must not be worse.
