@@ -18,16 +18,16 @@ namespace prolate {
 namespace {
 
 constexpr double kLastKappa = 18;
-constexpr double kFirstStep = 0.07, kStepDecay = 0.75; // relative to the radii; falls to 0.4 % of the first
-constexpr double kPull = 20;            // growth of the multipliers, times ellipsoids / points
+constexpr double kFirstStep = 0.07, kStepDecay = 0.75;  // relative to the radii; falls to 0.4 % of the first
+constexpr double kPull = 20;                            // growth of the multipliers, times ellipsoids / points
 constexpr double kEarlyPull = 2, kAccumulateFrom = 0.3; // until then a penalty on the excess alone, with kappa
-constexpr double kMaxExcess = 0.3;     // radial coordinates beyond 1 count no more than this
-constexpr int kNeighbourInterval = 8;  // iterations between two searches for neighbours
+constexpr double kMaxExcess = 0.3;                      // radial coordinates beyond 1 count no more than this
+constexpr int kNeighbourInterval = 8;                   // iterations between two searches for neighbours
 constexpr double kNeighbourMargin = 1.2;
 constexpr size_t kPointStride = 8;     // a covered point is looked at every so many iterations
 constexpr double kRelocateUntil = 0.6; // share of the iterations
 constexpr int kRelocations = 20;       // rounds of relocation, were they made to the end
-constexpr double kUseless = 0.07;      // relocated: what it alone covers is less than this much of what it goes to halve
+constexpr double kUseless = 0.07; // relocated: what it alone covers is less than this much of what it goes to halve
 
 // Gradient descent with momentum, each ellipsoid's step normalised by the size of its recent gradients (Kingma and Ba
 // 2015, with one common scale for all nine parameters, so that steps do not depend on the choice of axes).
@@ -149,7 +149,8 @@ private:
 
     // Who covers each point, how hard those that nobody covers pull, and on whom.
     void update_points(size_t iteration, bool accumulating) {
-        const double rate = (accumulating ? kPull : kEarlyPull * kappa_) * static_cast<double>(fits_.size()) / static_cast<double>(std::max<size_t>(1, points_.size()));
+        const double rate = (accumulating ? kPull : kEarlyPull * kappa_) * static_cast<double>(fits_.size()) /
+                            static_cast<double>(std::max<size_t>(1, points_.size()));
         tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
             for (size_t p = range.begin(); p != range.end(); ++p) {
                 if (multiplier_[p] == 0 && (p + iteration) % kPointStride != 0) continue;
@@ -204,12 +205,14 @@ private:
 
     // Ellipsoids that alone cover little go to halve those that stick out most.
     bool relocate() {
-        const auto [covers, outside] = exclusive_volumes();
+        const auto volumes = exclusive_volumes();
+        const auto &covers = volumes.first, &outside = volumes.second; // clang 14 captures no structured bindings
         std::vector<uint32_t> by_use(fits_.size()), by_need(fits_.size());
         std::iota(by_use.begin(), by_use.end(), 0u);
         by_need = by_use;
         std::stable_sort(by_use.begin(), by_use.end(), [&](uint32_t a, uint32_t b) { return covers[a] < covers[b]; });
-        std::stable_sort(by_need.begin(), by_need.end(), [&](uint32_t a, uint32_t b) { return outside[a] > outside[b]; });
+        std::stable_sort(by_need.begin(), by_need.end(),
+                         [&](uint32_t a, uint32_t b) { return outside[a] > outside[b]; });
         std::vector<bool> done(fits_.size(), false);
         size_t made = 0;
         const size_t limit = std::max<size_t>(1, fits_.size() / 16);

@@ -88,8 +88,8 @@ void DistanceField::sign(MeshView mesh, bool closed, const Winding& winding) {
     for (int i = 0; i < size_[0]; ++i)
         for (int j = 0; j < size_[1]; ++j)
             for (const Interval& solid : columns.column(i, j)) {
-                const int k1 = std::min(static_cast<int>(std::floor((solid.high - origin_.z()) * per_pitch_)),
-                                        size_[2] - 1);
+                const int k1 =
+                    std::min(static_cast<int>(std::floor((solid.high - origin_.z()) * per_pitch_)), size_[2] - 1);
                 for (int k = std::max(static_cast<int>(std::ceil((solid.low - origin_.z()) * per_pitch_)), 0); k <= k1;
                      ++k)
                     distance_[index(i, j, k)] = -std::abs(distance_[index(i, j, k)]);

@@ -80,8 +80,13 @@ Fit::Fit(const Ellipsoid& e)
 
 Ellipsoid Fit::ellipsoid() const {
     const auto f = [](double x) { return static_cast<float>(x); };
-    return {{f(center.x()), f(center.y()), f(center.z())}, f(factor(0, 0)), f(factor(1, 0)), f(factor(1, 1)),
-            f(factor(2, 0)), f(factor(2, 1)), f(factor(2, 2))};
+    return {{f(center.x()), f(center.y()), f(center.z())},
+            f(factor(0, 0)),
+            f(factor(1, 0)),
+            f(factor(1, 1)),
+            f(factor(2, 0)),
+            f(factor(2, 1)),
+            f(factor(2, 2))};
 }
 
 double Fit::volume() const {

@@ -14,16 +14,16 @@ namespace {
 
 constexpr uint32_t kNobody = UINT32_MAX;
 constexpr uint32_t kMaxLeaves = 65536;
-constexpr uint32_t kMergeLimit = 64;       // clusters, up to which merging is a start; it costs more than it gives above
-constexpr uint32_t kFew = 16;              // ellipsoids, up to which it is the first choice
-constexpr uint32_t kManyStarts = 64;       // children of one parent, below which there are more starts than usual,
-constexpr int kMostStarts = 4;             // up to so many times
+constexpr uint32_t kMergeLimit = 64; // clusters, up to which merging is a start; it costs more than it gives above
+constexpr uint32_t kFew = 16;        // ellipsoids, up to which it is the first choice
+constexpr uint32_t kManyStarts = 64; // children of one parent, below which there are more starts than usual,
+constexpr int kMostStarts = 4;       // up to so many times
 constexpr uint32_t kPiecesPerCluster[] = {16, 32, 8, 24, 12}; // of the merging starts, in turn
-constexpr double kUncoveredWeight = 50;    // per volume outside, when descents are compared
-constexpr double kShapeScale = 0.35;       // Objective::scale, in sides of a cube with an ellipsoid's share of the solid
+constexpr double kUncoveredWeight = 50;                       // per volume outside, when descents are compared
+constexpr double kShapeScale = 0.35; // Objective::scale, in sides of a cube with an ellipsoid's share of the solid
 constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
-constexpr double kReheat = 10;             // kappa at the start of a cycle
-constexpr double kLeastGain = 0.999;       // a level must bring the outside volume down to less than this much
+constexpr double kReheat = 10;                                    // kappa at the start of a cycle
+constexpr double kLeastGain = 0.999; // a level must bring the outside volume down to less than this much
 
 class Grower {
 public:
@@ -106,15 +106,14 @@ private:
         for (int start = 0; start < effort.starts && !cancelled(); ++start) {
             std::vector<uint32_t> owner;
             EllipsoidSet set = start_set(task, start, owner);
-            descend_set(set, owner, effort.iterations, 1, static_cast<uint64_t>(start),
+            descend_set(set, owner, effort.iterations, 1, start,
                         [&](double done) { progress(0.9 * (start + done) / rounds); });
             const double error = approximate_error(set);
-            if (error < least || best.fits.empty())
-                least = error, best = std::move(set), best_owner = std::move(owner);
+            if (error < least || best.fits.empty()) least = error, best = std::move(set), best_owner = std::move(owner);
         }
         for (int cycle = 0; cycle < effort.cycles && !cancelled(); ++cycle) {
             EllipsoidSet set = best;
-            descend_set(set, best_owner, effort.iterations / 2, kReheat, static_cast<uint64_t>(effort.starts + cycle),
+            descend_set(set, best_owner, effort.iterations / 2, kReheat, effort.starts + cycle,
                         [&](double done) { progress(0.9 * (effort.starts + cycle + done) / rounds); });
             const double error = approximate_error(set);
             if (error < least) least = error, best = std::move(set);
@@ -418,10 +417,11 @@ private:
             std::vector<Fit> fits;
             for (const Leaf& leaf : leaves) fits.push_back(leaf.fit);
             const double ratio = outside_of(fits) / solid_volume_;
-            const double steepness = std::clamp(
-                std::log(low_ratio / ratio) / std::log(static_cast<double>(count) / low), 0.4, 1.5);
+            const double steepness =
+                std::clamp(std::log(low_ratio / ratio) / std::log(static_cast<double>(count) / low), 0.4, 1.5);
             if (ratio > tolerance) {
-                if (count == kMaxLeaves || leaves.size() < count || (!best.empty() && count * 1.1 >= static_cast<double>(best.size()))) {
+                if (count == kMaxLeaves || leaves.size() < count ||
+                    (!best.empty() && count * 1.1 >= static_cast<double>(best.size()))) {
                     if (best.empty()) grown_.goal_reached = false, best = std::move(leaves);
                     return best;
                 }
@@ -431,7 +431,8 @@ private:
                 if (count <= low * 1.1 + 1) return best;
             }
             const double guess = low * std::pow(low_ratio / (0.97 * tolerance), 1 / steepness);
-            const double most = best.empty() ? std::min<double>(kMaxLeaves, low * 8.0) : static_cast<double>(best.size()) - 1;
+            const double most =
+                best.empty() ? std::min<double>(kMaxLeaves, low * 8.0) : static_cast<double>(best.size()) - 1;
             count = static_cast<uint32_t>(std::clamp(std::ceil(guess), low + 1.0, std::max(low + 1.0, most)));
         }
         return best;
@@ -486,7 +487,8 @@ private:
         size_t cut = members.size() * left / count;
         cut = std::clamp(cut, std::max(left, members.size() - std::min(members.size(), right * most)),
                          std::min(left * most, members.size() - right));
-        auto [a, b] = divide(std::move(members), [&](uint32_t leaf) { return leaves[leaf].fit.center; }, cut);
+        auto [a, b] = divide(
+            std::move(members), [&](uint32_t leaf) { return leaves[leaf].fit.center; }, cut);
         std::vector<std::vector<uint32_t>> out = divided(leaves, std::move(a), left, most);
         for (std::vector<uint32_t>& part : divided(leaves, std::move(b), right, most)) out.push_back(std::move(part));
         return out;

@@ -14,8 +14,8 @@ bool before(const Vec& a, const Vec& b) {
 
 ColumnLattice corner_lattice(const Voxels& voxels, int parts) {
     const double step = voxels.pitch() / parts;
-    return {voxels.origin().x(), voxels.origin().y(), step, step, voxels.size()[0] * parts + 1,
-            voxels.size()[1] * parts + 1};
+    return {voxels.origin().x(),          voxels.origin().y(),         step, step,
+            voxels.size()[0] * parts + 1, voxels.size()[1] * parts + 1};
 }
 
 } // namespace
@@ -67,11 +67,13 @@ void Pieces::add_voxels(const Voxels& voxels) {
     for (uint32_t cell = 0; cell < voxels.cell_count(); ++cell) {
         const auto& [i, j, k] = voxels.coordinates(cell);
         size_t level = 0;
-        while (level + 1 < whole.size() && whole[level + 1][at(level + 1, i >> (level + 1), j >> (level + 1), k >> (level + 1))])
+        while (level + 1 < whole.size() &&
+               whole[level + 1][at(level + 1, i >> (level + 1), j >> (level + 1), k >> (level + 1))])
             ++level;
         const int mask = (1 << level) - 1;
         if (level > 0 && ((i & mask) || (j & mask) || (k & mask))) continue; // its block's first voxel speaks for it
-        Piece piece{{i * kParts, j * kParts, k * kParts}, kParts << level, 0, 0, 0, triangles_.size(), size(), Vec::Zero(), 0};
+        Piece piece{
+            {i * kParts, j * kParts, k * kParts}, kParts << level, 0, 0, 0, triangles_.size(), size(), Vec::Zero(), 0};
         const auto triangles = voxels.triangles(cell);
         piece.triangle_count = static_cast<uint32_t>(triangles.size());
         triangles_.insert(triangles_.end(), triangles.begin(), triangles.end());

@@ -45,8 +45,9 @@ public:
         }
     }
 
-    /// Cuts the piece along the middle planes of its box. The parts lie in the hull of its points. One keeps the piece's
-    /// number, the others get the next free ones. False, and nothing changes, if the piece is as small as pieces get.
+    /// Cuts the piece along the middle planes of its box. The parts lie in the hull of its points. One keeps the
+    /// piece's number, the others get the next free ones. False, and nothing changes, if the piece is as small as
+    /// pieces get.
     bool refine(uint32_t piece);
 
     /// The piece that `piece` was a part of when it got its number; itself if it was one from the start. Never higher.
@@ -70,7 +71,7 @@ public:
 
 private:
     static constexpr int kParts = 4; // of a voxel: the smallest pieces
-    static constexpr int kBlock = 8;  // voxels: the largest pieces
+    static constexpr int kBlock = 8; // voxels: the largest pieces
 
     struct Piece {
         std::array<int, 3> low; // of its box, in steps

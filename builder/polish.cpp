@@ -14,12 +14,12 @@
 namespace prolate {
 namespace {
 
-constexpr double kHeld = 1 + 1e-7;        // squared radial coordinate up to which a point counts as held
-constexpr double kNearlyHeld = 1.005;     // scale of an ellipsoid that holds a piece well enough not to cut it
-constexpr double kMargin = 1.2;           // ellipsoids may grow so much before neighbours are looked for again
-constexpr int kNeighbourInterval = 4;     // sweeps
+constexpr double kHeld = 1 + 1e-7;    // squared radial coordinate up to which a point counts as held
+constexpr double kNearlyHeld = 1.005; // scale of an ellipsoid that holds a piece well enough not to cut it
+constexpr double kMargin = 1.2;       // ellipsoids may grow so much before neighbours are looked for again
+constexpr int kNeighbourInterval = 4; // sweeps
 constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
-constexpr double kFirstReward = 0.1;      // for volume inside the solid that no other covers; falls to 0
+constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -248,7 +248,9 @@ private:
             if (out.empty()) break;
             const size_t most = std::min(out.size(), kCuts);
             std::partial_sort(out.begin(), out.begin() + static_cast<std::ptrdiff_t>(most), out.end(),
-                              [](const auto& s, const auto& t) { return s.first > t.first || (s.first == t.first && s.second < t.second); });
+                              [](const auto& s, const auto& t) {
+                                  return s.first > t.first || (s.first == t.first && s.second < t.second);
+                              });
             for (size_t c = 0; c < most; ++c) constraints.push_back(constraint(fit, points[out[c].second]));
             const Step step = nearest_admitted(wanted, constraints);
             next = moved(fit, step.head<3>(), shape_of(step, options_.primitive), options_.min_radius);

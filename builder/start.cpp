@@ -18,7 +18,7 @@ constexpr double kFitTolerance = 2e-2; // merging ranks pairs; the result is ref
 constexpr size_t kAllPairsLimit = 400; // pieces up to which components may pair up freely
 constexpr int kVolumeSamples = 192;    // of an ellipsoid, for its outside volume
 constexpr int kLloydRounds = 8;
-constexpr uint32_t kDirectLimit = 64;  // clusters found at once; for more, the cells are halved first
+constexpr uint32_t kDirectLimit = 64; // clusters found at once; for more, the cells are halved first
 
 struct Piece {
     std::vector<uint32_t> cells;
@@ -37,8 +37,7 @@ uint32_t find_root(std::vector<uint32_t>& parent, uint32_t i) {
 // Which cells of a set touch each other.
 class Neighbourhood {
 public:
-    Neighbourhood(const Voxels& voxels, std::span<const uint32_t> cells)
-        : voxels_(voxels), cells_(cells) {}
+    Neighbourhood(const Voxels& voxels, std::span<const uint32_t> cells) : voxels_(voxels), cells_(cells) {}
     // Visits the positions in the set of the cells that touch cells[position], by half of the 26 around it: over all
     // positions, each pair once.
     template <class Visit> void later(uint32_t position, Visit&& visit) const {
@@ -250,8 +249,7 @@ std::vector<Cluster> spread_start(const Voxels& voxels, std::span<const uint32_t
         std::stable_sort(order.begin(), order.end(),
                          [&](uint32_t a, uint32_t b) { return sites[a][axis] < sites[b][axis]; });
         std::vector<uint32_t> half[2];
-        for (size_t i = 0; i < order.size(); ++i)
-            half[i >= order.size() * (k / 2) / k].push_back(cells[order[i]]);
+        for (size_t i = 0; i < order.size(); ++i) half[i >= order.size() * (k / 2) / k].push_back(cells[order[i]]);
         std::vector<Cluster> out;
         for (size_t h = 0; h < 2; ++h) {
             std::sort(half[h].begin(), half[h].end());

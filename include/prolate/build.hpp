@@ -14,11 +14,11 @@ namespace prolate {
 /// if none is, levels = 3. An exact tree goes down to its triangles instead: it takes none of the three, and of the
 /// rest only degree, leaf_triangles and threads change it.
 struct BuildOptions {
-    uint32_t degree = 8;     ///< children per node, 2 ... kMaxDegree
-    uint32_t levels = 0;     ///< levels below the root, 1 ... kMaxLevels - 1
-    uint32_t ellipsoids = 0; ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
-    float tolerance = 0;     ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
-    Method method = Method::voxel;              ///< how E_vol is evaluated; analytic needs a closed mesh
+    uint32_t degree = 8;           ///< children per node, 2 ... kMaxDegree
+    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1
+    uint32_t ellipsoids = 0;       ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
+    float tolerance = 0;           ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
+    Method method = Method::voxel; ///< how E_vol is evaluated; analytic needs a closed mesh
     Primitive primitive = Primitive::ellipsoid; ///< what the nodes are
     Quality quality = Quality::normal;          ///< voxel resolution and effort of the optimisation
     float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
