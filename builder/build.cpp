@@ -9,6 +9,7 @@
 
 #include "src/format.hpp"
 
+#include <Eigen/Geometry>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -142,13 +143,24 @@ private:
     }
     static Error stopped() { return {ErrorCode::cancelled, "cancelled", 0}; }
 
+    double surface_area() const {
+        double area = 0;
+        for (const Triangle& t : mesh_.triangles) {
+            const Vec a = to_vec(mesh_.vertices[t[0]]);
+            area += 0.5 * (to_vec(mesh_.vertices[t[1]]) - a).cross(to_vec(mesh_.vertices[t[2]]) - a).norm();
+        }
+        return area;
+    }
+    double distance_tolerance() const {
+        return kDistanceTolerance[static_cast<size_t>(options_.quality)] * box_.size().norm();
+    }
     // A volume as a share of the solid's.
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 
     // Leaves to expect, for the choice of the resolution.
     double expected_leaves() const {
         if (options_.ellipsoids) return options_.ellipsoids;
-        if (options_.tolerance > 0) return 1000;
+        if (options_.tolerance > 0 || options_.distance > 0) return 1000;
         return std::min(std::pow(double(options_.degree), options_.levels ? options_.levels : 3u), 65536.0);
     }
 
@@ -182,14 +194,22 @@ private:
         const DistanceField field(mesh_, closed_, winding, std::min(field_resolution, kMaxFieldResolution));
         const Voxels cells = start_cells(winding);
         const Columns columns = measuring_columns(mesh_, closed_, winding, kMeterColumns);
-        const GrowOptions options{options_, effort_, kSmallestRadius * box_.size().norm(), &cancelled_,
+        const GrowOptions options{options_,
+                                  effort_,
+                                  kSmallestRadius * box_.size().norm(),
+                                  box_.size().norm(),
+                                  &cancelled_,
                                   [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
         const auto exact = [&winding, sign = winding_sign_](const Fit& fit) {
             EllipsoidVolume inside = inside_volume(fit, winding);
             inside.volume *= sign, inside.d_center *= sign, inside.d_shape *= sign;
             return outside_volume(fit, inside);
         };
-        Solid solid{pieces, cells, field, columns, {}};
+        const auto distance = [&](std::span<const Ellipsoid> cover) {
+            const HausdorffDistance found = hausdorff_distance(cover, winding, closed_, distance_tolerance(), 1);
+            return found.max + found.max_error;
+        };
+        Solid solid{pieces, cells, field, columns, surface_area(), {}, distance};
         if (options_.method == Method::analytic) solid.outside = exact;
         return grow(solid, options);
     }
@@ -239,7 +259,9 @@ private:
         info.alpha = options_.alpha;
         info.beta = options_.beta;
         info.tolerance = options_.tolerance;
-        const bool asked = options_.levels || options_.ellipsoids || options_.tolerance > 0 || options_.exact;
+        info.distance = options_.distance;
+        const bool asked =
+            options_.levels || options_.ellipsoids || options_.tolerance > 0 || options_.distance > 0 || options_.exact;
         info.levels = asked ? options_.levels : 3;
         info.ellipsoids = options_.ellipsoids;
         info.seed = options_.seed;
@@ -270,9 +292,8 @@ private:
                     relative(volume.outside.error) + figure.outside_ratio * relative(solid_.error);
                 figure.sum_outside_ratio = relative(volume.sum_outside.value);
             }
-            const auto quality = static_cast<size_t>(options_.quality);
             const HausdorffDistance distance = hausdorff_distance(
-                cut, winding, closed_, kDistanceTolerance[quality] * box_.size().norm(), kDistanceSamples[quality]);
+                cut, winding, closed_, distance_tolerance(), kDistanceSamples[static_cast<size_t>(options_.quality)]);
             figure.hausdorff_max = distance.max + distance.max_error;
             figure.hausdorff_mean = distance.mean;
             figure.hausdorff_p99 = distance.p99;

@@ -20,10 +20,14 @@ constexpr uint32_t kManyStarts = 64; // children of one parent, below which ther
 constexpr int kMostStarts = 4;       // up to so many times
 constexpr uint32_t kPiecesPerCluster[] = {16, 32, 8, 24, 12}; // of the merging starts, in turn
 constexpr double kUncoveredWeight = 50;                       // per volume outside, when descents are compared
-constexpr double kShapeScale = 0.35; // Objective::scale, in sides of a cube with an ellipsoid's share of the solid
+// Objective::scale: in sides of a cube with an ellipsoid's share of the solid, of a square with its share of the surface.
+constexpr double kShapeScale = 0.35, kThinShapeScale = 0.1;
 constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
 constexpr double kReheat = 10;                                    // kappa at the start of a cycle
-constexpr double kLeastGain = 0.999; // a level must bring the outside volume down to less than this much
+constexpr int kRounds = 12;             // at most, of a search for the count that meets a limit
+constexpr double kMet = 0.999;          // of a limit: quantisation will add a little
+constexpr double kCountTolerance = 1.1; // the search ends this close to the least count
+constexpr double kLeastGain = 0.999;    // a level must bring the outside volume down to less than this much
 
 class Grower {
 public:
@@ -37,8 +41,8 @@ public:
         if (goal.ellipsoids)
             grow_upwards(goal.ellipsoids > 1 ? solve_flat(goal.ellipsoids, [this](double done) { report(done); })
                                              : std::vector<Leaf>{});
-        else if (goal.tolerance > 0)
-            grow_upwards(meet_tolerance(goal.tolerance));
+        else if (goal.tolerance > 0 || goal.distance > 0)
+            grow_upwards(meet_limits());
         else
             grow_downwards(goal.levels ? goal.levels : 3);
         if (!cancelled()) tidy();
@@ -72,10 +76,12 @@ private:
         started_ = now;
     }
 
+    // Thin solids, and surfaces that enclose none, are measured by their area.
     Objective objective(size_t count) const {
-        const double volume = std::max(solid_volume_, 1e-9 * std::pow(solid_.field.pitch(), 3));
-        return {double{options_.build.alpha}, double{options_.build.beta},
-                kShapeScale * std::cbrt(volume / static_cast<double>(count))};
+        const double n = static_cast<double>(count);
+        const double scale =
+            std::max(kShapeScale * std::cbrt(solid_volume_ / n), kThinShapeScale * std::sqrt(solid_.area / n));
+        return {double{options_.build.alpha}, double{options_.build.beta}, scale};
     }
 
     void grow_root() {
@@ -238,7 +244,7 @@ private:
             if (cancelled()) return;
             if (solved.outside >= kLeastGain * outside) { // as for a ball
                 grown_.goal_reached = false;
-                follow_cuts(piece_count);
+                follow_cuts(grown_.nodes, piece_count);
                 return;
             }
             outside = solved.outside;
@@ -311,14 +317,14 @@ private:
         return added;
     }
 
-    // Pieces that were cut since `count` there were belong to whom their wholes belong.
-    void follow_cuts(uint32_t count) {
-        std::vector<uint32_t> leaf(pieces_.size(), kNobody);
-        for (uint32_t n = 0; n < grown_.nodes.size(); ++n)
-            for (const uint32_t piece : grown_.nodes[n].pieces) leaf[piece] = n;
+    // Pieces that were cut since `count` there were belong to whom their wholes belong. Owners: nodes or leaves.
+    template <class Owner> void follow_cuts(std::vector<Owner>& owners, uint32_t count) const {
+        std::vector<uint32_t> owner_of(pieces_.size(), kNobody);
+        for (uint32_t n = 0; n < owners.size(); ++n)
+            for (const uint32_t piece : owners[n].pieces) owner_of[piece] = n;
         for (uint32_t piece = count; piece < pieces_.size(); ++piece) {
-            leaf[piece] = leaf[pieces_.cut_from(piece)];
-            grown_.nodes[leaf[piece]].pieces.push_back(piece);
+            owner_of[piece] = owner_of[pieces_.cut_from(piece)];
+            owners[owner_of[piece]].pieces.push_back(piece);
         }
     }
 
@@ -406,35 +412,53 @@ private:
         return {{items.begin(), middle}, {middle, items.end()}};
     }
 
-    // The fewest leaves that meet the tolerance, to about a tenth: the ratio falls about like a power of the count.
-    std::vector<Leaf> meet_tolerance(double tolerance) {
-        uint32_t low = 1, count = 8; // low: known to be too few
-        double low_ratio = outside_of({&grown_.nodes[0].fit, 1}) / solid_volume_;
-        std::vector<Leaf> best;
-        for (int round = 0; round < 12 && !cancelled(); ++round) {
-            std::vector<Leaf> leaves = solve_flat(count, [&](double part) { report((round + part) / 12); });
-            if (cancelled()) return {};
-            std::vector<Fit> fits;
-            for (const Leaf& leaf : leaves) fits.push_back(leaf.fit);
-            const double ratio = outside_of(fits) / solid_volume_;
-            const double steepness =
-                std::clamp(std::log(low_ratio / ratio) / std::log(static_cast<double>(count) / low), 0.4, 1.5);
-            if (ratio > tolerance) {
-                if (count == kMaxLeaves || leaves.size() < count ||
-                    (!best.empty() && count * 1.1 >= static_cast<double>(best.size()))) {
-                    if (best.empty()) grown_.goal_reached = false, best = std::move(leaves);
-                    return best;
-                }
-                low = count, low_ratio = ratio;
-            } else {
-                best = std::move(leaves);
-                if (count <= low * 1.1 + 1) return best;
-            }
-            const double guess = low * std::pow(low_ratio / (0.97 * tolerance), 1 / steepness);
-            const double most =
-                best.empty() ? std::min<double>(kMaxLeaves, low * 8.0) : static_cast<double>(best.size()) - 1;
-            count = static_cast<uint32_t>(std::clamp(std::ceil(guess), low + 1.0, std::max(low + 1.0, most)));
+    // How far the cover is from what was asked: above 1, not there yet.
+    double excess(std::span<const Fit> fits) const {
+        const BuildOptions& goal = options_.build;
+        double out = 0;
+        if (goal.tolerance > 0) out = outside_of(fits) / solid_volume_ / goal.tolerance;
+        if (goal.distance > 0) {
+            std::vector<Ellipsoid> cover;
+            for (const Fit& fit : fits) cover.push_back(fit.ellipsoid());
+            out = std::max(out, solid_.distance(cover) / (0.01 * goal.distance * options_.diagonal));
         }
+        return out;
+    }
+
+    // The fewest leaves that meet the limits, to about a tenth: errors fall about like a power of the count.
+    std::vector<Leaf> meet_limits() {
+        uint32_t low = 1, count = 8; // low: known to be too few
+        double low_excess = excess({&grown_.nodes[0].fit, 1});
+        if (low_excess <= kMet) return {};
+        std::vector<Leaf> best;
+        for (int round = 0; round < kRounds && !cancelled(); ++round) {
+            const uint32_t piece_count = pieces_.size();
+            std::vector<Leaf> leaves = solve_flat(count, [&](double part) { report((round + part) / kRounds); });
+            if (cancelled()) return {};
+            if (!best.empty()) follow_cuts(best, piece_count);
+            std::vector<Fit> fits;
+            fits.reserve(leaves.size());
+            for (const Leaf& leaf : leaves) fits.push_back(leaf.fit);
+            const double now = excess(fits), most = static_cast<double>(best.size()); // 0: unknown
+            const bool met = now <= kMet;
+            if (met) {
+                best = std::move(leaves);
+                if (count <= low * kCountTolerance + 1) return best;
+            } else if (count == kMaxLeaves || leaves.size() < count ||
+                       (!best.empty() && count * kCountTolerance >= most)) {
+                if (!best.empty()) return best;
+                grown_.goal_reached = false;
+                return leaves;
+            }
+            const double steepness =
+                std::clamp(std::log(low_excess / now) / std::log(static_cast<double>(count) / low), 0.4, 1.5);
+            if (!met) low = count, low_excess = now;
+            const double guess = low * std::pow(low_excess / (0.97 * kMet), 1 / steepness);
+            const double limit =
+                best.empty() ? std::min<double>(kMaxLeaves, low * 8.0) : static_cast<double>(best.size()) - 1;
+            count = static_cast<uint32_t>(std::clamp(std::ceil(guess), low + 1.0, std::max(low + 1.0, limit)));
+        }
+        if (best.empty()) grown_.goal_reached = false;
         return best;
     }
 

@@ -2,7 +2,7 @@
 //
 // A level is optimised as a whole, as a set: start, descent, polish. Levels are grown downwards when levels are asked
 // for - the ellipsoids of a level then see those above as limits, see EllipsoidSet - and upwards from the leaves when a
-// number of leaves or a tolerance is.
+// number of leaves, a tolerance or a distance is.
 #pragma once
 
 #include "builder/columns.hpp"
@@ -39,6 +39,7 @@ struct GrowOptions {
     BuildOptions build;
     Effort effort;
     double min_radius; ///< metres
+    double diagonal;   ///< of the mesh's box, metres
     const std::atomic<bool>* cancelled;
     /// Called now and then with the share of the work done and the number of nodes; may set `cancelled`.
     std::function<void(double, uint32_t)> progress;
@@ -56,8 +57,11 @@ struct Solid {
     const Voxels& cells; ///< coarser: to start from
     const DistanceField& field;
     const Columns& columns; ///< to compare covers
+    double area;            ///< of the surface, square metres
     /// E_vol of an ellipsoid and its gradient, in closed form; empty for the voxel method.
     std::function<EllipsoidVolume(const Fit&)> outside;
+    /// One-sided Hausdorff distance of a cover, metres.
+    std::function<double(std::span<const Ellipsoid>)> distance;
 };
 
 /// The same for any number of threads. After a cancellation the result is incomplete.

@@ -13,16 +13,18 @@ namespace prolate {
 Result<void> validate(const BuildOptions& o) {
     const auto bad = [](const char* what, uint64_t value) { return Error{ErrorCode::bad_options, what, value}; };
     if (o.degree < 2 || o.degree > kMaxDegree) return bad("degree must be 2 to 64", o.degree);
-    if ((o.levels > 0) + (o.ellipsoids > 0) + (o.tolerance != 0) > 1)
-        return bad("give only one of levels, ellipsoids and tolerance", 0);
+    const bool has_limit = o.tolerance != 0 || o.distance != 0;
+    if ((o.levels > 0) + (o.ellipsoids > 0) + has_limit > 1)
+        return bad("give only one of levels, ellipsoids, and tolerance or distance or both", 0);
     if (o.levels >= kMaxLevels) return bad("levels must be 1 to 31", o.levels);
     if (o.ellipsoids > 65536) return bad("ellipsoids must be 1 to 65536", o.ellipsoids);
     if (!std::isfinite(o.tolerance) || o.tolerance < 0) return bad("tolerance must be above 0", 0);
+    if (!std::isfinite(o.distance) || o.distance < 0) return bad("distance must be above 0", 0);
     if (!std::isfinite(o.alpha) || o.alpha < 0) return bad("alpha must be 0 or above", 0);
     if (!std::isfinite(o.beta) || o.beta < 0) return bad("beta must be 0 or above", 0);
     if (o.alpha + o.beta <= 0) return bad("alpha and beta must not both be 0", 0);
-    if (o.exact && (o.levels > 0 || o.ellipsoids > 0 || o.tolerance != 0))
-        return bad("an exact tree goes down to its triangles: give no levels, ellipsoids or tolerance", 0);
+    if (o.exact && (o.levels > 0 || o.ellipsoids > 0 || has_limit))
+        return bad("an exact tree goes down to its triangles: give no levels, ellipsoids, tolerance or distance", 0);
     if (o.exact && o.primitive != Primitive::ellipsoid)
         return bad("an exact tree is made of ellipsoids", static_cast<uint64_t>(o.primitive));
     if (o.leaf_triangles < 1 || o.leaf_triangles > kMaxLeafTriangles)
@@ -32,14 +34,15 @@ Result<void> validate(const BuildOptions& o) {
 }
 
 uint64_t hash(const BuildOptions& o) {
-    std::array<std::byte, 48> bytes{};
+    std::array<std::byte, 52> bytes{};
     std::byte* to = bytes.data();
     const auto put = [&to](auto value) {
         store_le(to, value);
         to += sizeof value;
     };
     put(kBuilderVersion), put(uint32_t{kFormatVersion});
-    put(o.degree), put(o.levels), put(o.ellipsoids), put(o.tolerance), put(o.alpha), put(o.beta), put(o.seed);
+    put(o.degree), put(o.levels), put(o.ellipsoids), put(o.tolerance), put(o.distance);
+    put(o.alpha), put(o.beta), put(o.seed);
     put(static_cast<uint8_t>(o.method)), put(static_cast<uint8_t>(o.primitive)), put(static_cast<uint8_t>(o.quality));
     put(static_cast<uint8_t>(o.exact ? o.leaf_triangles : 0));
     return hash_bytes(bytes);

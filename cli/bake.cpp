@@ -13,7 +13,9 @@ namespace prolate::cli {
 namespace {
 
 constexpr const char* kFooter = R"(
-Give at most one of --levels, --ellipsoids and --tolerance; without one, 3 levels are made.
+Give at most one of --levels, --ellipsoids, and --tolerance or --distance or both; without one, 3 levels are made.
+--tolerance and --distance take as few leaves as will do, each where the shape needs it; the cover sticks out by no more
+than that volume and that distance.
 With --exact the tree goes down to the triangles and keeps them, a few in each leaf: its ellipsoids cover the surface
 only and cull, and queries answer as the triangles do. 100,000 triangles take about a second, whatever the quality.
 Coordinates and lengths are in the mesh's own unit. The same mesh and options give the same bytes.
@@ -33,8 +35,8 @@ A manifest bakes many assets in one run. It is a JSON file:
     ]
   }
 An entry has mesh, output, and any of the options above by their long names, without dashes: numbers, texts, and true for
-an option without a value. What an entry does not say, the defaults do; if it has one of levels, ellipsoids, tolerance
-and exact, those of the defaults do not count. Paths are relative to the manifest's folder. A bad entry, or an asset that
+an option without a value. What an entry does not say, the defaults do; if it has one of levels, ellipsoids, tolerance,
+distance and exact, those of the defaults do not count. Paths are relative to the manifest's folder. A bad entry, or an asset that
 fails, is told in one line and does not stop the others; the exit code is then 1. Ctrl-C keeps what is done.
 )";
 

@@ -112,6 +112,8 @@ void declare_asset_options(CLI::App& app, Asset& a) {
     app.add_option("--levels", a.levels, "levels below the root, 1 ... 31");
     app.add_option("--ellipsoids", a.ellipsoids, "number of leaves, 1 ... 65536: the best set of so many");
     app.add_option("--tolerance", a.tolerance, "outside volume of the leaves / volume of the solid, above 0");
+    app.add_option("--distance", a.distance,
+                   "largest distance of the leaves from the solid, % of the diagonal, above 0");
     app.add_option("--method", a.method, "how outside volumes are found: voxel or analytic")->capture_default_str();
     app.add_option("--primitive", a.primitive, "what the nodes are: ellipsoid or sphere")->capture_default_str();
     app.add_option("--alpha", a.options.alpha, "weight of the surface error")->capture_default_str();
@@ -162,9 +164,11 @@ std::optional<BuildOptions> options_of(const Asset& a, int& code) {
     if (a.levels == 0u) return refuse("--levels", "must be 1 to 31", "see 'prolate bake --help'");
     if (a.ellipsoids == 0u) return refuse("--ellipsoids", "must be 1 to 65536", "see 'prolate bake --help'");
     if (a.tolerance == 0.0f) return refuse("--tolerance", "must be above 0", "see 'prolate bake --help'");
+    if (a.distance == 0.0f) return refuse("--distance", "must be above 0", "see 'prolate bake --help'");
     options.levels = a.levels.value_or(0);
     options.ellipsoids = a.ellipsoids.value_or(0);
     options.tolerance = a.tolerance.value_or(0);
+    options.distance = a.distance.value_or(0);
     if (const auto valid = validate(options); !valid) {
         code = complain("bake", valid.error());
         return std::nullopt;
@@ -178,7 +182,7 @@ std::optional<Baked> bake_asset(const Asset& a, BakeCache& cache, bool force, co
     auto baked = make(a, cache, force, label, code);
     if (!baked) return {};
     if (!baked->tree.view().bake_info().goal_reached)
-        note(a.mesh, "the asked number or tolerance was not reached at this resolution; try --quality best");
+        note(a.mesh, "the asked number, tolerance or distance was not reached at this resolution; try --quality best");
     if (baked->source != Source::unchanged)
         if (code = write_output(a.output, baked->tree.bytes()); code != kDone) return {};
     cache.keep(baked->tree.view(), baked->source == Source::baked);

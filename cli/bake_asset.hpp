@@ -23,7 +23,7 @@ struct Asset {
     std::string mesh, output, report;
     std::string method = "voxel", primitive = "ellipsoid", quality = "normal";
     std::optional<uint32_t> levels, ellipsoids;
-    std::optional<float> tolerance;
+    std::optional<float> tolerance, distance;
     BuildOptions options;
 };
 

@@ -67,7 +67,9 @@ std::string as_text(const std::string& name, const TreeView& tree) {
                            info.seed, info.resolution);
     if (info.levels > 0) out += fmt::format("  asked     {} levels below the root\n", info.levels);
     if (info.ellipsoids > 0) out += fmt::format("  asked     {} leaves\n", grouped(info.ellipsoids));
-    if (info.tolerance > 0) out += fmt::format("  asked     tolerance {:g}\n", info.tolerance);
+    if (info.tolerance > 0) out += fmt::format("  asked     outside ratio of at most {:g}\n", info.tolerance);
+    if (info.distance > 0)
+        out += fmt::format("  asked     distance of at most {:g} % of the diagonal\n", info.distance);
     if (!info.goal_reached) out += "  missed    what was asked could not be met at this resolution\n";
     out += fmt::format("  hashes    source {:016x}, options {:016x}\n", info.source_hash, info.options_hash);
     out += level_table(tree);

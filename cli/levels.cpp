@@ -99,7 +99,10 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["alpha"] = shortest(info.alpha);
     out["beta"] = shortest(info.beta);
     out["seed"] = info.seed;
-    out["asked"] = {{"levels", info.levels}, {"ellipsoids", info.ellipsoids}, {"tolerance", shortest(info.tolerance)}};
+    out["asked"] = {{"levels", info.levels},
+                    {"ellipsoids", info.ellipsoids},
+                    {"tolerance", shortest(info.tolerance)},
+                    {"distance", shortest(info.distance)}};
     out["goal_reached"] = info.goal_reached;
     out["source_hash"] = fmt::format("{:016x}", info.source_hash);
     out["options_hash"] = fmt::format("{:016x}", info.options_hash);

@@ -53,7 +53,7 @@ enum HeaderOffset : size_t {
     kAtComponentCount = 124,
     kAtDiagonal = 128,
     kAtSolidVolumeError = 136,
-    kAtReserved2 = 140,
+    kAtDistance = 140,
     kHeaderBytes = 144,
 };
 enum Flag : uint32_t { kSurfaceMode = 1, kExact = 2, kProved = 4, kGoalMissed = 8, kAllFlags = 15 };
@@ -185,15 +185,13 @@ Result<void> check_header(std::span<const std::byte> bytes) {
         return bad("unknown primitive", kAtPrimitive);
     if (load_le<uint8_t>(h + kAtQuality) > static_cast<uint8_t>(Quality::best))
         return bad("unknown quality", kAtQuality);
-    for (const size_t at : {kAtAlpha, kAtBeta, kAtTolerance})
+    for (const size_t at : {kAtAlpha, kAtBeta, kAtTolerance, kAtDistance})
         if (!std::isfinite(load_le<float>(h + at)) || load_le<float>(h + at) < 0) return bad("option out of range", at);
     if (!all_zero(h + kAtReserved0, 2)) return bad("reserved bytes are not zero", kAtReserved0);
     if (!all_zero(h + kAtReserved1, 1)) return bad("reserved bytes are not zero", kAtReserved1);
     if (!is_metric(load_le<double>(h + kAtDiagonal))) return bad("diagonal out of range", kAtDiagonal);
     if (!is_metric(load_le<float>(h + kAtSolidVolumeError)))
         return bad("solid volume error out of range", kAtSolidVolumeError);
-    if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
-        return bad("reserved bytes are not zero", kAtReserved2);
     if (!(flags & kExact)) {
         if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
             return bad("triangle counts of a tree without triangles", kAtVertexCount);
@@ -317,6 +315,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     store_le(h + kAtAlpha, info.alpha);
     store_le(h + kAtBeta, info.beta);
     store_le(h + kAtTolerance, info.tolerance);
+    store_le(h + kAtDistance, info.distance);
     store_le(h + kAtLevels, info.levels);
     store_le(h + kAtEllipsoids, info.ellipsoids);
     store_le(h + kAtSeed, info.seed);
@@ -498,6 +497,7 @@ BakeInfo TreeView::bake_info() const noexcept {
             .alpha = load_le<float>(h + kAtAlpha),
             .beta = load_le<float>(h + kAtBeta),
             .tolerance = load_le<float>(h + kAtTolerance),
+            .distance = load_le<float>(h + kAtDistance),
             .levels = load_le<uint32_t>(h + kAtLevels),
             .ellipsoids = load_le<uint32_t>(h + kAtEllipsoids),
             .seed = load_le<uint64_t>(h + kAtSeed),

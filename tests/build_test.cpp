@@ -270,7 +270,7 @@ TEST(Build, FiguresAreThoseOfTheFile) {
 // equal versions for equal bytes.
 TEST(Build, BytesChangeOnlyWithTheBuildersVersion) {
     const Build built = must_build(shapes::torus(1, 0.3f, 24, 12), quick(1));
-    EXPECT_EQ(kBuilderVersion, 3u);
+    EXPECT_EQ(kBuilderVersion, 4u);
     EXPECT_EQ(hash_bytes(built.tree.bytes()), 8879677852444613718u);
 }
 
@@ -374,6 +374,27 @@ TEST(Build, ToleranceIsMet) {
     EXPECT_EQ(flat.error().code, ErrorCode::bad_mesh);
 }
 
+TEST(Build, DistanceIsMet) {
+    BuildOptions options = quick(0);
+    options.distance = 2;
+    for (const Mesh& mesh : {shapes::torus(1, 0.3f, 48, 24), shapes::sheet(1, 1, 4)}) {
+        const Build built = must_build(mesh, options);
+        EXPECT_TRUE(built.goal_reached);
+        EXPECT_LE(built.levels.back().hausdorff_max, 0.02 * 1.01 * built.diagonal);
+        EXPECT_GT(built.levels.front().hausdorff_max, 0.02 * built.diagonal);
+        EXPECT_EQ(built.tree.view().bake_info().distance, 2.0f);
+        expect_proved(mesh, built);
+    }
+    // Both limits hold if both are given.
+    options.tolerance = 0.3f;
+    const Build both = must_build(shapes::torus(1, 0.3f, 48, 24), options);
+    EXPECT_LE(both.levels.back().hausdorff_max, 0.02 * 1.01 * both.diagonal);
+    EXPECT_LE(both.levels.back().outside_ratio, 0.3 * 1.01);
+    // A sheet's own ellipsoid is as close as the sheet is flat.
+    options.tolerance = 0, options.distance = 50;
+    EXPECT_EQ(must_build(shapes::sheet(1, 1, 4), options).levels.size(), 1u);
+}
+
 TEST(Build, GoalsThatCannotBeMetAreAdmitted) {
     // A sliver meets a few hundred cells at the finest resolution: no more leaves than that.
     const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0.5f, 1e-4f, 0}}, {{0, 1, 2}}};
@@ -398,6 +419,8 @@ TEST(Build, RefusesBadOptionsByName) {
     EXPECT_EQ(code([](BuildOptions& o) { o.levels = 2, o.ellipsoids = 5; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](BuildOptions& o) { o.tolerance = -1; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](BuildOptions& o) { o.tolerance = NAN; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](BuildOptions& o) { o.distance = -1; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](BuildOptions& o) { o.distance = 1, o.levels = 2; }), ErrorCode::bad_options);
     EXPECT_EQ(code([](BuildOptions& o) { o.alpha = 0, o.beta = 0; }), ErrorCode::bad_options);
 }
 

@@ -10,14 +10,15 @@
 
 namespace prolate {
 
-/// Options of build(). The defaults are a sound choice. Exactly one of levels, ellipsoids, tolerance may be non-zero;
-/// if none is, levels = 3. An exact tree goes down to its triangles instead: it takes none of the three, and of the
-/// rest only degree, leaf_triangles and threads change it.
+/// Options of build(). The defaults are a sound choice. Only one of levels, ellipsoids, and tolerance or distance
+/// or both may be non-zero; if none is, levels = 3. An exact tree goes down to its triangles instead: it takes none of
+/// them, and of the rest only degree, leaf_triangles and threads change it.
 struct BuildOptions {
     uint32_t degree = 8;           ///< children per node, 2 ... kMaxDegree
     uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1
     uint32_t ellipsoids = 0;       ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
     float tolerance = 0;           ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
+    float distance = 0;            ///< the same for their Hausdorff distance, in % of the diagonal of the mesh's box
     Method method = Method::voxel; ///< how E_vol is evaluated; analytic needs a closed mesh
     Primitive primitive = Primitive::ellipsoid; ///< what the nodes are
     Quality quality = Quality::normal;          ///< voxel resolution and effort of the optimisation
@@ -34,7 +35,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
 /// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
-inline constexpr uint32_t kBuilderVersion = 3;
+inline constexpr uint32_t kBuilderVersion = 4;
 
 /// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
 /// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
@@ -68,7 +69,7 @@ struct Build {
     double diagonal = 0;           ///< of the mesh's bounding box, metres
     uint32_t resolution = 0;       ///< voxels along the longest side
     bool surface_mode = false;
-    bool goal_reached = true; ///< false: the asked tolerance or count could not be met at this resolution
+    bool goal_reached = true; ///< false: the asked count, tolerance or distance could not be met at this resolution
     double seconds = 0;
 };
 

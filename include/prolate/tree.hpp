@@ -43,7 +43,7 @@ struct BakeInfo {
     bool surface_mode = false; ///< true: the mesh was open, and only its triangles are guaranteed covered
     bool exact = false;        ///< an exact tree: only the triangles are covered, and stored beside the nodes
     bool proved = false;       ///< the cover of every level was proved, after quantisation, before the file was written
-    bool goal_reached = true;  ///< false: the asked tolerance or count could not be met
+    bool goal_reached = true;  ///< false: the asked count, tolerance or distance could not be met
     double solid_volume = 0;   ///< volume of the solid, cubic metres; 0 where there is no inside
     float solid_volume_error = 0; ///< of solid_volume, relative; found as LevelFigures::outside_ratio_error is
     double diagonal = 0;          ///< of the mesh's bounding box, metres
@@ -52,6 +52,7 @@ struct BakeInfo {
     Quality quality = Quality::normal;
     float alpha = 0, beta = 0; ///< weights of E_sur^3 and E_vol (paper, eq. 3)
     float tolerance = 0;       ///< asked outside ratio, 0 = not asked
+    float distance = 0;        ///< asked Hausdorff distance, in % of the diagonal, 0 = not asked
     uint32_t levels = 0;       ///< asked levels below the root, 0 = not asked
     uint32_t ellipsoids = 0;   ///< asked leaves, 0 = not asked
     uint64_t seed = 0;         ///< of the surface sampling
