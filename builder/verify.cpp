@@ -2,9 +2,14 @@
 //
 // For a box B, the polyhedron (solid ∩ B) is the convex combination of its extreme points, and those are corners of the
 // triangles clipped to B, or corners of B inside the solid. If all of them lie in one ellipsoid, so does the whole
-// piece, because an ellipsoid is convex. Otherwise B is cut into eight. The proof ends because the ellipsoids overlap:
+// piece, because an ellipsoid is convex. The same may hold of its two parts on either side of a plane, and two
+// ellipsoids: along the seam of neighbours that overlap little, boxes alone would be as many as the seam's area is
+// larger than the overlap's square. Failing that, B is cut into eight. The proof ends because the ellipsoids overlap:
 // around each point of the solid there is a box small enough for one of them, unless that point is on the very border
 // of all ellipsoids that contain it.
+//
+// A query reaches a node only through those above it. So "in a node" means: in its ellipsoid and in all of theirs,
+// which is convex, too.
 //
 // Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners
 // of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
@@ -38,10 +43,26 @@ constexpr double kAccuracy = 3;                // of the winding number, see Win
 constexpr int kTaskLevels = 3;                 // 8^3 boxes to share between threads
 constexpr size_t kFewCandidates = 6;           // up to so many are tried in pairs
 
-struct Shape {
+struct Shape { // a node and, by `parent`, those above it
     Fit fit;
-    double shrunk;           // squared radial coordinate up to which a point is inside beyond doubt
-    double shortest_inverse; // bounds |L^-1 v| / |v|
+    double shrunk;                 // squared radial coordinate up to which a point is inside beyond doubt
+    double shortest_inverse;       // bounds |L^-1 v| / |v|
+    const Shape* parent = nullptr; // of the root: none
+
+    bool ellipsoid_holds(const Vec& p) const { return fit.radial_squared(p) <= shrunk; }
+    bool holds(const Vec& p) const { return ellipsoid_holds(p) && (parent == nullptr || parent->holds(p)); }
+    bool barely_holds(const Vec& p) const {
+        return fit.radial_squared(p) <= 1 && (parent == nullptr || parent->barely_holds(p));
+    }
+    // The ellipsoid that `p` is farthest out in.
+    const Fit& outermost(const Vec& p) const {
+        const Fit* found = &fit;
+        double largest = fit.radial_squared(p);
+        for (const Shape* s = parent; s != nullptr; s = s->parent)
+            if (const double radial = s->fit.radial_squared(p); radial > largest) largest = radial, found = &s->fit;
+        return *found;
+    }
+    double radial_squared(const Vec& p) const { return outermost(p).radial_squared(p); }
 };
 
 struct Cell {
@@ -60,6 +81,7 @@ public:
     // Done with this cell? If not, it has to be cut.
     bool settled(Cell& cell) {
         ++proof.pieces;
+        suspect_.reset();
         drop_far_candidates(cell);
         if (cell.polygons.empty() && !winding_) return true; // surface mode: nothing here to cover
         for (const uint32_t c : cell.candidates)
@@ -74,8 +96,7 @@ public:
             if (cell.candidates.size() <= kFewCandidates)
                 for (size_t b = 1; b < cell.candidates.size(); ++b)
                     for (size_t a = 0; a < b; ++a)
-                        if (hold_parts(shapes_[cell.candidates[a]], shapes_[cell.candidates[b]], cell, corner_inside) ||
-                            !proof.covered)
+                        if (hold_parts(shapes_[cell.candidates[a]], shapes_[cell.candidates[b]], cell, corner_inside))
                             return true;
         }
         refute(cell);
@@ -133,45 +154,44 @@ private:
     }
     bool inside(const Vec& p) const { return std::abs(winding(p)) > 0.25; }
 
-    static bool holds(const Shape& shape, const Vec& p) { return shape.fit.radial_squared(p) <= shape.shrunk; }
-
-    bool holds_box(const Shape& shape, const Box& box) const {
+    static bool holds_box(const Shape& shape, const Box& box) {
         for (unsigned i = 0; i < 8; ++i)
-            if (!holds(shape, box.corner(i))) return false;
-        return true;
+            if (!shape.ellipsoid_holds(box.corner(i))) return false;
+        return shape.parent == nullptr || holds_box(*shape.parent, box);
     }
 
     bool holds_piece(const Shape& shape, const Cell& cell, std::array<int8_t, 8>& corner_inside) const {
         for (const Polygon& polygon : cell.polygons)
             for (const Vec& p : polygon)
-                if (!holds(shape, p)) return false;
-        if (!winding_) return true;
+                if (!shape.ellipsoid_holds(p)) return false;
+        if (!winding_) return shape.parent == nullptr || holds_piece(*shape.parent, cell, corner_inside);
         for (unsigned i = 0; i < 8; ++i) {
             const Vec corner = cell.box.corner(i);
-            if (holds(shape, corner)) continue;
+            if (shape.ellipsoid_holds(corner)) continue;
             if (corner_inside[i] < 0) corner_inside[i] = inside(corner);
             if (corner_inside[i]) return false;
         }
-        return true;
+        return shape.parent == nullptr || holds_piece(*shape.parent, cell, corner_inside);
     }
 
     // Does `a` hold what is below, and `b` what is above the plane that is tangent, near the middle of the cell, to the
     // surface of equal radial coordinates? The parts' corners are those of the cell, and where the plane cuts edges.
-    // A corner that neither holds may be the counterexample.
+    // A corner that they do not hold is suspect: it may be a counterexample.
     bool hold_parts(const Shape& a, const Shape& b, const Cell& cell, std::array<int8_t, 8>& corner_inside) {
         for (const Polygon& polygon : cell.polygons)
             for (const Vec& p : polygon)
-                if (!holds(a, p) && !holds(b, p)) return false;
+                if (!a.holds(p) && !b.holds(p)) return false;
         Vec on_plane = cell.box.center(), normal;
+        const Fit &fit_a = a.outermost(on_plane), &fit_b = b.outermost(on_plane);
         for (int newton = 0; newton < 3; ++newton) {
-            const Vec from_a = a.fit.inverse * (on_plane - a.fit.center);
-            const Vec from_b = b.fit.inverse * (on_plane - b.fit.center);
-            normal = 2 * (a.fit.inverse.transpose() * from_a - b.fit.inverse.transpose() * from_b);
+            const Vec from_a = fit_a.inverse * (on_plane - fit_a.center);
+            const Vec from_b = fit_b.inverse * (on_plane - fit_b.center);
+            normal = 2 * (fit_a.inverse.transpose() * from_a - fit_b.inverse.transpose() * from_b);
             if (normal.squaredNorm() == 0) return false;
             if (newton < 2) on_plane -= (from_a.squaredNorm() - from_b.squaredNorm()) / normal.squaredNorm() * normal;
         }
         const auto height = [&](const Vec& p) { return normal.dot(p - on_plane); };
-        const auto holds_own = [&](const Vec& p, double h) { return (h > 0 || holds(a, p)) && (h < 0 || holds(b, p)); };
+        const auto holds_own = [&](const Vec& p, double h) { return (h > 0 || a.holds(p)) && (h < 0 || b.holds(p)); };
         const auto cut_of = [](const Vec& p, double h_p, const Vec& q, double h_q) -> Vec {
             return p + h_p / (h_p - h_q) * (q - p);
         };
@@ -183,7 +203,7 @@ private:
                 if (!holds_own(p, h)) return false;
                 if (h * last < 0)
                     if (const Vec cut = cut_of(p, h, before, last); !holds_own(cut, 0)) {
-                        refute_at(cut, cell, [] { return true; });
+                        suspect_ = cut;
                         return false;
                     }
                 last = h;
@@ -223,13 +243,16 @@ private:
 
     // A counterexample, if `p` is a point of the solid and no ellipsoid contains it, not even barely.
     template <class InSolid> void refute_at(const Vec& p, const Cell& cell, InSolid&& in_solid) {
-        double nearest = HUGE_VAL;
-        for (const uint32_t c : cell.candidates) {
-            nearest = std::min(nearest, shapes_[c].fit.radial_squared(p));
-            if (nearest <= 1) return;
-        }
+        const auto holds_it = [&](uint32_t c) { return shapes_[c].barely_holds(p); };
+        if (holds_it(last_holder_)) return; // of points one after the other, most often the same
+        for (const uint32_t c : cell.candidates)
+            if (holds_it(c)) {
+                last_holder_ = c;
+                return;
+            }
         if (!in_solid()) return;
-        for (const Shape& shape : shapes_) nearest = std::min(nearest, shape.fit.radial_squared(p));
+        double nearest = HUGE_VAL;
+        for (const Shape& shape : shapes_) nearest = std::min(nearest, shape.radial_squared(p));
         if (nearest <= 1) return;
         proof.covered = false;
         proof.has_counterexample = true;
@@ -239,6 +262,8 @@ private:
 
     // Looks for a counterexample among the points at hand.
     void refute(const Cell& cell) {
+        if (suspect_) refute_at(*suspect_, cell, [] { return true; });
+        if (!proof.covered) return;
         for (const Polygon& polygon : cell.polygons)
             for (const Vec& p : polygon) {
                 refute_at(p, cell, [] { return true; });
@@ -261,7 +286,23 @@ private:
     const Winding* winding_; // null in surface mode
     double size_;
     std::atomic<bool>& stop_;
+    uint32_t last_holder_ = 0;   // a shape
+    std::optional<Vec> suspect_; // a point of the surface, in the cell at hand
 };
+
+std::vector<Shape> shapes_of(const TreeView& tree, double rounding) {
+    std::vector<Shape> shapes(tree.node_count());
+    for (uint32_t node = 0; node < tree.node_count(); ++node) {
+        Shape& shape = shapes[node];
+        shape.fit = Fit(tree.ellipsoid(node));
+        shape.shortest_inverse = shape.fit.inverse.norm();
+        const double margin = std::max(0.0, 1 - rounding * shape.shortest_inverse);
+        shape.shrunk = margin > 0 ? margin * margin - 1e-14 : -1;
+        const ChildRange children = tree.children(node);
+        for (uint32_t c = 0; c < children.count; ++c) shapes[children.first + c].parent = &shape;
+    }
+    return shapes;
+}
 
 LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Winding* winding, const Box& box,
                        const std::function<bool(double)>& progress, std::atomic<bool>& stop) {
@@ -342,16 +383,11 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
 
     std::atomic<bool> stop = false;
     tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
+    std::vector<Shape> all = shapes_of(tree, rounding);
     report.covered = true;
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
         std::vector<Shape> shapes;
-        tree.for_each_in_cut(l, [&](uint32_t node) {
-            Shape shape{Fit(tree.ellipsoid(node)), 0, 0};
-            shape.shortest_inverse = shape.fit.inverse.norm();
-            const double margin = std::max(0.0, 1 - rounding * shape.shortest_inverse);
-            shape.shrunk = margin > 0 ? margin * margin - 1e-14 : -1;
-            shapes.push_back(shape);
-        });
+        tree.for_each_in_cut(l, [&](uint32_t node) { shapes.push_back(all[node]); });
         const auto progress = [&](double fraction) { return options.progress((l + fraction) / tree.level_count()); };
         std::function<bool(double)> level_progress;
         if (options.progress) level_progress = progress;
@@ -361,6 +397,9 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
         if (stop) return Error{ErrorCode::cancelled, "cancelled", 0};
         report.covered = report.covered && proof.covered;
         report.levels.push_back(proof);
+        if (l == 0 && proof.covered) // the root holds everything: no need to ask it again
+            for (Shape& shape : all)
+                if (shape.parent == &all[0]) shape.parent = nullptr;
     }
     return report;
 }
