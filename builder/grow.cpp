@@ -20,19 +20,25 @@ constexpr uint32_t kManyStarts = 64; // children of one parent, below which ther
 constexpr int kMostStarts = 4;       // up to so many times
 constexpr uint32_t kPiecesPerCluster[] = {16, 32, 8, 24, 12}; // of the merging starts, in turn
 constexpr double kUncoveredWeight = 50;                       // per volume outside, when descents are compared
-// Objective::scale: in sides of a cube with an ellipsoid's share of the solid, of a square with its share of the surface.
+// Objective::scale: in sides of a cube with an ellipsoid's share of the solid, of a square with its share of the
+// surface.
 constexpr double kShapeScale = 0.35, kThinShapeScale = 0.1;
 constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
-constexpr double kReheat = 10;                                    // kappa at the start of a cycle
-constexpr int kRounds = 12;             // at most, of a search for the count that meets a limit
-constexpr double kMet = 0.999;          // of a limit: quantisation will add a little
-constexpr double kCountTolerance = 1.1; // the search ends this close to the least count
-constexpr double kLeastGain = 0.999;    // a level must bring the outside volume down to less than this much
+constexpr double kMostShare = 2; // of a child's leaves, times its equal share of its parent's; the two smallest of
+constexpr double kMostShareOfAll = 2.0 / 3; // degree + 1 parts have less: such parts are always found
+constexpr double kReheat = 10;              // kappa at the start of a cycle
+constexpr int kRounds = 12;                 // at most, of a search for the count that meets a limit
+constexpr double kMet = 0.999;              // of a limit: quantisation will add a little
+constexpr double kCountTolerance = 1.1;     // the search ends this close to the least count
+constexpr double kLeastGain = 0.999;        // a level must bring the outside volume down to less than this much
 
 class Grower {
 public:
     Grower(const Solid& solid, const GrowOptions& options)
         : solid_(solid), pieces_(solid.pieces), options_(options), solid_volume_(solid.columns.volume().value),
+          outside_volume_([this](const Fit& fit) {
+              return solid_.outside ? solid_.outside(fit).volume : sampled_outside_volume(fit, solid_.field);
+          }),
           started_(Clock::now()) {}
 
     Grown run() {
@@ -151,14 +157,11 @@ private:
         const auto seed = options_.build.seed + static_cast<uint64_t>(start);
         const uint32_t pieces_per_cluster =
             kPiecesPerCluster[static_cast<size_t>(start) / 2 % std::size(kPiecesPerCluster)];
-        const std::function<double(const Fit&)> outside = [this](const Fit& fit) {
-            return solid_.outside ? solid_.outside(fit).volume : sampled_outside_volume(fit, solid_.field);
-        };
         std::vector<std::vector<Cluster>> clusters(task.cells.size());
         tbb::parallel_for(size_t{0}, task.cells.size(), [&](size_t p) {
             if (merging)
                 clusters[p] = merge_start(solid_.cells, task.cells[p], task.children, pieces_per_cluster,
-                                          options_.min_radius, outside);
+                                          options_.min_radius, outside_volume_);
             else
                 clusters[p] = spread_start(solid_.cells, task.cells[p], task.children, seed, options_.min_radius);
         });
@@ -462,25 +465,37 @@ private:
         return best;
     }
 
-    // A tree over `leaves`: as many levels as the degree needs.
+    // A tree over `leaves`, about as high as the degree needs: in each group, those merge that fit together best.
     void grow_upwards(const std::vector<Leaf>& leaves) {
         if (cancelled() || leaves.size() < 2) return;
-        std::vector<uint32_t> members(leaves.size());
-        std::iota(members.begin(), members.end(), 0u);
-        grown_.nodes[0].pieces.clear();
-        uint32_t height = 0;
-        for (size_t reach = 1; reach < leaves.size(); reach *= options_.build.degree) ++height;
+        std::vector<Sketch> sketches(leaves.size());
+        std::vector<Fit> fits;
+        for (size_t i = 0; i < leaves.size(); ++i) {
+            for (const uint32_t piece : leaves[i].pieces) sketches[i].add(pieces_.points(piece));
+            fits.push_back(leaves[i].fit);
+        }
+        const std::vector<std::vector<uint32_t>> touching = neighbours_of(fits, 1);
+
         // Breadth-first, so that the children of a node are consecutive.
-        std::vector<std::pair<uint32_t, std::vector<uint32_t>>> groups{{0, members}}; // a node and its leaves
-        for (uint32_t level = 1; level <= height; ++level) {
-            size_t reach = 1; // leaves that a node of this level can have
-            for (uint32_t l = level; l < height; ++l) reach *= options_.build.degree;
-            std::vector<std::pair<uint32_t, std::vector<uint32_t>>> next;
-            for (auto& [parent, own] : groups) {
-                if (own.size() < 2) continue;
-                const size_t children = std::min<size_t>(own.size(), options_.build.degree);
+        struct Group {
+            uint32_t node;
+            std::vector<uint32_t> members; // leaves, rising
+        };
+        std::vector<Group> groups(1);
+        groups[0].node = 0;
+        groups[0].members.resize(leaves.size());
+        std::iota(groups[0].members.begin(), groups[0].members.end(), 0u);
+        grown_.nodes[0].pieces.clear();
+        for (uint32_t level = 1; !groups.empty(); ++level) {
+            std::vector<std::vector<std::vector<uint32_t>>> parts(groups.size());
+            tbb::parallel_for(size_t{0}, groups.size(),
+                              [&](size_t g) { parts[g] = parts_of(groups[g].members, sketches, touching); });
+            std::vector<Group> next;
+            for (size_t g = 0; g < groups.size(); ++g) {
+                const uint32_t parent = groups[g].node;
                 grown_.nodes[parent].first_child = static_cast<uint32_t>(grown_.nodes.size());
-                for (std::vector<uint32_t>& part : divided(leaves, std::move(own), children, reach)) {
+                grown_.nodes[parent].child_count = static_cast<uint32_t>(parts[g].size());
+                for (std::vector<uint32_t>& part : parts[g]) {
                     GrownNode node;
                     node.level = level;
                     node.parent = parent;
@@ -492,30 +507,36 @@ private:
                         for (const uint32_t leaf : part)
                             pieces.insert(pieces.end(), leaves[leaf].pieces.begin(), leaves[leaf].pieces.end());
                         node.fit = fit_around(pieces);
+                        next.push_back({static_cast<uint32_t>(grown_.nodes.size()), std::move(part)});
                     }
-                    next.emplace_back(static_cast<uint32_t>(grown_.nodes.size()), std::move(part));
                     grown_.nodes.push_back(std::move(node));
-                    ++grown_.nodes[parent].child_count;
                 }
             }
             groups.swap(next);
+            if (groups.empty()) end_level(level);
         }
-        end_level(height);
     }
 
-    // `members` in `count` parts of at most `most` each, by halving.
-    static std::vector<std::vector<uint32_t>> divided(const std::vector<Leaf>& leaves, std::vector<uint32_t> members,
-                                                      size_t count, size_t most) {
-        if (count == 1) return {std::move(members)};
-        const size_t left = count / 2, right = count - left;
-        size_t cut = members.size() * left / count;
-        cut = std::clamp(cut, std::max(left, members.size() - std::min(members.size(), right * most)),
-                         std::min(left * most, members.size() - right));
-        auto [a, b] = divide(
-            std::move(members), [&](uint32_t leaf) { return leaves[leaf].fit.center; }, cut);
-        std::vector<std::vector<uint32_t>> out = divided(leaves, std::move(a), left, most);
-        for (std::vector<uint32_t>& part : divided(leaves, std::move(b), right, most)) out.push_back(std::move(part));
-        return out;
+    // Some leaves in as many groups as a node has children, none of them much larger than its share, if that can be.
+    std::vector<std::vector<uint32_t>> parts_of(std::span<const uint32_t> leaves, std::span<const Sketch> sketches,
+                                                std::span<const std::vector<uint32_t>> touching) const {
+        const uint32_t degree = options_.build.degree;
+        const double share = std::min(kMostShare / degree, kMostShareOfAll);
+        const auto most = static_cast<size_t>(std::ceil(share * static_cast<double>(leaves.size())));
+        std::vector<Sketch> own;
+        std::vector<std::vector<uint32_t>> neighbours(leaves.size());
+        for (size_t i = 0; i < leaves.size(); ++i) {
+            own.push_back(sketches[leaves[i]]);
+            for (const uint32_t other : touching[leaves[i]]) {
+                const auto found = std::lower_bound(leaves.begin(), leaves.end(), other);
+                if (found != leaves.end() && *found == other)
+                    neighbours[i].push_back(static_cast<uint32_t>(found - leaves.begin()));
+            }
+        }
+        auto parts = merge_groups(own, neighbours, degree, most, options_.min_radius, outside_volume_);
+        for (std::vector<uint32_t>& part : parts)
+            for (uint32_t& member : part) member = leaves[member];
+        return parts;
     }
 
     const Solid& solid_;
@@ -523,6 +544,7 @@ private:
     const GrowOptions& options_;
     Grown grown_;
     const double solid_volume_;
+    const std::function<double(const Fit&)> outside_volume_; // E_vol
     Clock::time_point started_;
     std::vector<Vec> points_; // of the surface, to be covered
 };

@@ -21,7 +21,7 @@ constexpr int kLloydRounds = 8;
 constexpr uint32_t kDirectLimit = 64; // clusters found at once; for more, the cells are halved first
 
 struct Piece {
-    std::vector<uint32_t> cells;
+    std::vector<uint32_t> members;
     Sketch sketch;
     std::set<uint32_t> neighbours;
     double error = 0;
@@ -83,46 +83,37 @@ uint32_t label_blocks(const Voxels& voxels, std::span<const uint32_t> cells, con
     return count;
 }
 
+// Greedy merging of pieces by the least growth of E_vol.
 class Merger {
 public:
-    Merger(double min_radius, const std::function<double(const Fit&)>& outside)
-        : min_radius_(min_radius), outside_(outside) {}
-
-    std::vector<Piece> pieces;
-
-    double error(const Sketch& sketch) const {
-        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_, kFitTolerance));
-    }
-
-    void offer(uint32_t a, uint32_t b) {
-        if (a > b) std::swap(a, b);
-        Sketch both = pieces[a].sketch;
-        both.add(pieces[b].sketch);
-        const double growth = error(both) - pieces[a].error - pieces[b].error;
-        queue_.push({growth, a, b, pieces[a].version, pieces[b].version});
-    }
-
-    // Merges the cheapest pair that is still current; false if there is none.
-    bool merge_one() {
-        while (!queue_.empty()) {
-            const Pair pair = queue_.top();
-            queue_.pop();
-            Piece &a = pieces[pair.a], &b = pieces[pair.b];
-            if (!a.alive || !b.alive || a.version != pair.version_a || b.version != pair.version_b) continue;
-            a.sketch.add(b.sketch);
-            a.cells.insert(a.cells.end(), b.cells.begin(), b.cells.end());
-            a.error = error(a.sketch);
-            ++a.version;
-            b.alive = false;
-            for (const uint32_t n : b.neighbours) {
-                pieces[n].neighbours.erase(pair.b);
-                if (n != pair.a) pieces[n].neighbours.insert(pair.a), a.neighbours.insert(n);
-            }
-            a.neighbours.erase(pair.b);
-            for (const uint32_t n : a.neighbours) offer(pair.a, n);
-            return true;
+    Merger(std::span<const Sketch> sketches, double min_radius, const std::function<double(const Fit&)>& outside)
+        : min_radius_(min_radius), outside_(outside), pieces_(sketches.size()) {
+        for (uint32_t i = 0; i < pieces_.size(); ++i) {
+            pieces_[i].members = {i};
+            pieces_[i].sketch = sketches[i];
+            pieces_[i].error = error(sketches[i]);
         }
-        return false;
+    }
+
+    void connect(uint32_t a, uint32_t b) {
+        pieces_[a].neighbours.insert(b);
+        pieces_[b].neighbours.insert(a);
+    }
+
+    // Until there are `k`, of at most `most` members each as far as that is possible. Returns what each is made of.
+    std::vector<std::vector<uint32_t>> run(uint32_t k, size_t most) {
+        most_ = most;
+        for (size_t left = pieces_.size(); left > k; --left) {
+            if (left == pieces_.size()) offer_all();
+            while (!merge_one()) connect_more();
+        }
+        std::vector<std::vector<uint32_t>> out;
+        for (Piece& piece : pieces_) {
+            if (!piece.alive) continue;
+            std::sort(piece.members.begin(), piece.members.end());
+            out.push_back(std::move(piece.members));
+        }
+        return out;
     }
 
 private:
@@ -134,9 +125,73 @@ private:
             return std::pair(a, b) > std::pair(other.a, other.b);
         }
     };
+
+    double error(const Sketch& sketch) const {
+        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_, kFitTolerance));
+    }
+
+    void offer(uint32_t a, uint32_t b) {
+        if (a > b) std::swap(a, b);
+        if (pieces_[a].members.size() + pieces_[b].members.size() > most_) return;
+        Sketch both = pieces_[a].sketch;
+        both.add(pieces_[b].sketch);
+        const double growth = error(both) - pieces_[a].error - pieces_[b].error;
+        queue_.push({growth, a, b, pieces_[a].version, pieces_[b].version});
+    }
+    void offer_all() {
+        for (uint32_t a = 0; a < pieces_.size(); ++a)
+            if (pieces_[a].alive)
+                for (const uint32_t b : pieces_[a].neighbours)
+                    if (a < b) offer(a, b);
+    }
+
+    // Merges the cheapest pair that is still current; false if there is none.
+    bool merge_one() {
+        while (!queue_.empty()) {
+            const Pair pair = queue_.top();
+            queue_.pop();
+            Piece &a = pieces_[pair.a], &b = pieces_[pair.b];
+            if (!a.alive || !b.alive || a.version != pair.version_a || b.version != pair.version_b) continue;
+            a.sketch.add(b.sketch);
+            a.members.insert(a.members.end(), b.members.begin(), b.members.end());
+            a.error = error(a.sketch);
+            ++a.version;
+            b.alive = false;
+            for (const uint32_t n : b.neighbours) {
+                pieces_[n].neighbours.erase(pair.b);
+                if (n != pair.a) connect(n, pair.a);
+            }
+            for (const uint32_t n : a.neighbours) offer(pair.a, n);
+            return true;
+        }
+        return false;
+    }
+
+    // No touching pieces are left, or none that are small enough: every piece may see every other, or, of very many,
+    // the next few. If they do already, the limit of the size was too strict.
+    void connect_more() {
+        std::vector<uint32_t> alive;
+        for (uint32_t a = 0; a < pieces_.size(); ++a)
+            if (pieces_[a].alive) alive.push_back(a);
+        const size_t reach = alive.size() <= kAllPairsLimit ? alive.size() : 8;
+        bool news = false;
+        for (size_t i = 0; i < alive.size(); ++i)
+            for (size_t j = i + 1; j < std::min(alive.size(), i + 1 + reach); ++j)
+                if (!pieces_[alive[i]].neighbours.contains(alive[j])) {
+                    news = true;
+                    connect(alive[i], alive[j]);
+                    offer(alive[i], alive[j]);
+                }
+        if (news) return;
+        most_ *= 2;
+        offer_all();
+    }
+
     const double min_radius_;
     const std::function<double(const Fit&)>& outside_;
+    std::vector<Piece> pieces_;
     std::priority_queue<Pair> queue_;
+    size_t most_ = 0;
 };
 
 Cluster cluster_of(const Voxels& voxels, std::vector<uint32_t> cells, double min_radius) {
@@ -186,51 +241,35 @@ std::vector<Cluster> merge_start(const Voxels& voxels, std::span<const uint32_t>
         }
     }
 
-    Merger merger(min_radius, outside);
-    merger.pieces.resize(count);
+    std::vector<Sketch> sketches(count);
+    std::vector<std::vector<uint32_t>> blocks(count);
     for (uint32_t p = 0; p < cells.size(); ++p) {
-        Piece& piece = merger.pieces[label[p]];
-        piece.cells.push_back(cells[p]);
+        sketches[label[p]].add(voxels.points(cells[p]));
+        blocks[label[p]].push_back(cells[p]);
+    }
+    Merger merger(sketches, min_radius, outside);
+    for (uint32_t p = 0; p < cells.size(); ++p)
         neighbourhood.later(p, [&](uint32_t q) {
-            if (label[p] == label[q]) return;
-            piece.neighbours.insert(label[q]);
-            merger.pieces[label[q]].neighbours.insert(label[p]);
+            if (label[p] != label[q]) merger.connect(label[p], label[q]);
         });
-    }
-    for (Piece& piece : merger.pieces) {
-        for (const uint32_t cell : piece.cells) piece.sketch.add(voxels.points(cell));
-        piece.error = merger.error(piece.sketch);
-    }
-    uint32_t left = count;
-    if (left > k)
-        for (uint32_t a = 0; a < count; ++a)
-            for (const uint32_t b : merger.pieces[a].neighbours)
-                if (a < b) merger.offer(a, b);
-    while (left > k) {
-        if (merger.merge_one()) {
-            --left;
-            continue;
-        }
-        // Separate components: let every piece see every other, or, among very many, the next few.
-        std::vector<uint32_t> alive;
-        for (uint32_t a = 0; a < count; ++a)
-            if (merger.pieces[a].alive) alive.push_back(a);
-        const size_t reach = alive.size() <= kAllPairsLimit ? alive.size() : 8;
-        for (size_t i = 0; i < alive.size(); ++i)
-            for (size_t j = i + 1; j < std::min(alive.size(), i + 1 + reach); ++j) {
-                merger.pieces[alive[i]].neighbours.insert(alive[j]);
-                merger.pieces[alive[j]].neighbours.insert(alive[i]);
-                merger.offer(alive[i], alive[j]);
-            }
-    }
-
     std::vector<Cluster> clusters;
-    for (Piece& piece : merger.pieces) {
-        if (!piece.alive) continue;
-        std::sort(piece.cells.begin(), piece.cells.end());
-        clusters.push_back(cluster_of(voxels, std::move(piece.cells), min_radius));
+    for (const std::vector<uint32_t>& merged : merger.run(k, SIZE_MAX)) {
+        std::vector<uint32_t> own;
+        for (const uint32_t block : merged) own.insert(own.end(), blocks[block].begin(), blocks[block].end());
+        std::sort(own.begin(), own.end());
+        clusters.push_back(cluster_of(voxels, std::move(own), min_radius));
     }
     return clusters;
+}
+
+std::vector<std::vector<uint32_t>> merge_groups(std::span<const Sketch> sketches,
+                                                std::span<const std::vector<uint32_t>> neighbours, uint32_t k,
+                                                size_t most, double min_radius,
+                                                const std::function<double(const Fit&)>& outside) {
+    Merger merger(sketches, min_radius, outside);
+    for (uint32_t a = 0; a < neighbours.size(); ++a)
+        for (const uint32_t b : neighbours[a]) merger.connect(a, b);
+    return merger.run(k, most);
 }
 
 std::vector<Cluster> spread_start(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, uint64_t seed,

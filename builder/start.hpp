@@ -28,6 +28,13 @@ std::vector<Cluster> merge_start(const Voxels& voxels, std::span<const uint32_t>
                                  uint32_t pieces_per_cluster, double min_radius,
                                  const std::function<double(const Fit&)>& outside);
 
+/// The same for things that are given by their sketches: returns `k` groups of their numbers, rising, of at most `most`
+/// each if that can be. `neighbours` say which touch.
+std::vector<std::vector<uint32_t>> merge_groups(std::span<const Sketch> sketches,
+                                                std::span<const std::vector<uint32_t>> neighbours, uint32_t k,
+                                                size_t most, double min_radius,
+                                                const std::function<double(const Fit&)>& outside);
+
 /// E_vol of the ellipsoid (paper, eq. 2), by sampling its inside.
 double sampled_outside_volume(const Fit& fit, const DistanceField& field);
 

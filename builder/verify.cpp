@@ -23,7 +23,9 @@
 #include "builder/fit.hpp"
 #include "builder/verify_exact.hpp"
 #include "builder/winding.hpp"
+#include "src/hash.hpp"
 
+#include <tbb/concurrent_unordered_map.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -41,6 +43,7 @@ constexpr double kSmallestBox = 1e-9;          // of the mesh's size: below, the
 constexpr uint64_t kPiecesPerTask = 4'000'000; // a bound on the work at hostile trees; real ones need about 10,000
 constexpr double kAccuracy = 3;                // of the winding number, see Winding
 constexpr int kTaskLevels = 3;                 // 8^3 boxes to share between threads
+constexpr size_t kMostCorners = 4'000'000;     // to remember
 constexpr size_t kFewCandidates = 6;           // up to so many are tried in pairs
 
 struct Shape { // a node and, by `parent`, those above it
@@ -69,12 +72,43 @@ struct Cell {
     Box box;
     std::vector<Polygon> polygons;    // the surface in the box
     std::vector<uint32_t> candidates; // ellipsoids that may meet the box
+    bool solid = false;               // wholly inside: there is no surface, and this is known
+};
+
+// The solid of a closed mesh. Thread-safe.
+class ClosedSolid {
+public:
+    explicit ClosedSolid(MeshView mesh) : winding_(mesh) {}
+
+    // The winding number is whole but on the surface, so a value in between tells of the error of the fast evaluation:
+    // then the exact sum.
+    double winding(const Vec& p) const {
+        const double fast = winding_(p, kAccuracy);
+        return std::abs(fast - std::round(fast)) < 0.1 ? fast : winding_(p, HUGE_VAL);
+    }
+    bool holds(const Vec& p) const { return std::abs(winding(p)) > 0.25; }
+    // The same for a corner of a box: those of neighbouring boxes, and of all levels, are the same points.
+    bool holds_corner(const Vec& p) const {
+        const Key key{p.x(), p.y(), p.z()};
+        if (const auto found = corners_.find(key); found != corners_.end()) return found->second;
+        const bool held = holds(p);
+        if (corners_.size() < kMostCorners) corners_.emplace(key, held);
+        return held;
+    }
+
+private:
+    using Key = std::array<double, 3>;
+    struct Hash {
+        size_t operator()(const Key& key) const { return hash_bytes(std::as_bytes(std::span(key))); }
+    };
+    Winding winding_;
+    mutable tbb::concurrent_unordered_map<Key, bool, Hash> corners_;
 };
 
 class Prover {
 public:
-    Prover(const std::vector<Shape>& shapes, const Winding* winding, double size, std::atomic<bool>& stop)
-        : shapes_(shapes), winding_(winding), size_(size), stop_(stop) {}
+    Prover(const std::vector<Shape>& shapes, const ClosedSolid* solid, double size, std::atomic<bool>& stop)
+        : shapes_(shapes), solid_(solid), size_(size), stop_(stop) {}
 
     LevelProof proof; // covered stays true until something speaks against it
 
@@ -83,22 +117,23 @@ public:
         ++proof.pieces;
         suspect_.reset();
         drop_far_candidates(cell);
-        if (cell.polygons.empty() && !winding_) return true; // surface mode: nothing here to cover
+        if (cell.polygons.empty() && !solid_) return true; // surface mode: nothing here to cover
         for (const uint32_t c : cell.candidates)
             if (holds_box(shapes_[c], cell.box)) return true;
-        if (cell.polygons.empty()) { // wholly inside the solid or wholly outside
-            if (!inside(cell.box.center())) return true;
-        } else {
-            std::array<int8_t, 8> corner_inside; // -1: not asked yet
-            corner_inside.fill(-1);
+        if (cell.polygons.empty() && !cell.solid) { // wholly inside the solid or wholly outside
+            if (!solid_->holds_corner(cell.box.corner(0))) return true;
+            cell.solid = true;
+        }
+        std::array<int8_t, 8> corner_inside;
+        corner_inside.fill(cell.solid ? 1 : -1); // -1: not asked yet
+        if (!cell.solid)
             for (const uint32_t c : cell.candidates)
                 if (holds_piece(shapes_[c], cell, corner_inside)) return true;
-            if (cell.candidates.size() <= kFewCandidates)
-                for (size_t b = 1; b < cell.candidates.size(); ++b)
-                    for (size_t a = 0; a < b; ++a)
-                        if (hold_parts(shapes_[cell.candidates[a]], shapes_[cell.candidates[b]], cell, corner_inside))
-                            return true;
-        }
+        if (cell.candidates.size() <= kFewCandidates)
+            for (size_t b = 1; b < cell.candidates.size(); ++b)
+                for (size_t a = 0; a < b; ++a)
+                    if (hold_parts(shapes_[cell.candidates[a]], shapes_[cell.candidates[b]], cell, corner_inside))
+                        return true;
         refute(cell);
         return !proof.covered;
     }
@@ -127,6 +162,7 @@ public:
                 parts[p].box.high[a] = upper ? cell.box.high[a] : middle[a];
             }
             parts[p].candidates = cell.candidates;
+            parts[p].solid = cell.solid;
         }
         Polygon x[2], y[2], z[2];
         for (const Polygon& polygon : cell.polygons) {
@@ -146,14 +182,6 @@ public:
     }
 
 private:
-    // Winding number of a closed mesh. It is whole but on the surface, so a value in between tells of the error of the
-    // fast evaluation: then the exact sum.
-    double winding(const Vec& p) const {
-        const double fast = (*winding_)(p, kAccuracy);
-        return std::abs(fast - std::round(fast)) < 0.1 ? fast : (*winding_)(p, HUGE_VAL);
-    }
-    bool inside(const Vec& p) const { return std::abs(winding(p)) > 0.25; }
-
     static bool holds_box(const Shape& shape, const Box& box) {
         for (unsigned i = 0; i < 8; ++i)
             if (!shape.ellipsoid_holds(box.corner(i))) return false;
@@ -164,11 +192,11 @@ private:
         for (const Polygon& polygon : cell.polygons)
             for (const Vec& p : polygon)
                 if (!shape.ellipsoid_holds(p)) return false;
-        if (!winding_) return shape.parent == nullptr || holds_piece(*shape.parent, cell, corner_inside);
+        if (!solid_) return shape.parent == nullptr || holds_piece(*shape.parent, cell, corner_inside);
         for (unsigned i = 0; i < 8; ++i) {
             const Vec corner = cell.box.corner(i);
             if (shape.ellipsoid_holds(corner)) continue;
-            if (corner_inside[i] < 0) corner_inside[i] = inside(corner);
+            if (corner_inside[i] < 0) corner_inside[i] = solid_->holds_corner(corner);
             if (corner_inside[i]) return false;
         }
         return shape.parent == nullptr || holds_piece(*shape.parent, cell, corner_inside);
@@ -209,13 +237,13 @@ private:
                 last = h;
             }
         }
-        if (!winding_) return true;
+        if (!solid_) return true;
         std::array<double, 8> heights;
         for (unsigned i = 0; i < 8; ++i) {
             const Vec corner = cell.box.corner(i);
             heights[i] = height(corner);
             if (holds_own(corner, heights[i])) continue;
-            if (corner_inside[i] < 0) corner_inside[i] = inside(corner);
+            if (corner_inside[i] < 0) corner_inside[i] = solid_->holds_corner(corner);
             if (corner_inside[i]) return false;
         }
         for (unsigned i = 0; i < 8; ++i)
@@ -223,7 +251,7 @@ private:
                 const unsigned j = i ^ axis;
                 if (i > j || !(heights[i] * heights[j] < 0)) continue;
                 const Vec cut = cut_of(cell.box.corner(i), heights[i], cell.box.corner(j), heights[j]);
-                if (!holds_own(cut, 0) && inside(cut)) return false;
+                if (!holds_own(cut, 0) && (cell.solid || solid_->holds(cut))) return false;
             }
         return true;
     }
@@ -269,11 +297,14 @@ private:
                 refute_at(p, cell, [] { return true; });
                 if (!proof.covered) return;
             }
-        if (!winding_) return;
+        if (!solid_) return;
         for (unsigned i = 0; i < 9 && proof.covered; ++i) {
             const Vec p = i < 8 ? cell.box.corner(i) : cell.box.center();
             // A point that close to 1/2 lies on the surface: as good a witness as any, but 3/4 leaves no doubt.
-            refute_at(p, cell, [&] { return std::abs(winding(p)) > 0.75; });
+            refute_at(p, cell, [&] {
+                if (cell.solid) return true;
+                return (i == 8 || solid_->holds_corner(p)) && std::abs(solid_->winding(p)) > 0.75;
+            });
         }
     }
 
@@ -283,7 +314,7 @@ private:
     }
 
     const std::vector<Shape>& shapes_;
-    const Winding* winding_; // null in surface mode
+    const ClosedSolid* solid_; // null in surface mode
     double size_;
     std::atomic<bool>& stop_;
     uint32_t last_holder_ = 0;   // a shape
@@ -304,7 +335,7 @@ std::vector<Shape> shapes_of(const TreeView& tree, double rounding) {
     return shapes;
 }
 
-LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Winding* winding, const Box& box,
+LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const ClosedSolid* solid, const Box& box,
                        const std::function<bool(double)>& progress, std::atomic<bool>& stop) {
     const double size = box.size().norm();
     // Cut down to enough boxes for the threads, settling on the way what can be.
@@ -315,7 +346,7 @@ LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Wi
             {to_vec(mesh.vertices[t[0]]), to_vec(mesh.vertices[t[1]]), to_vec(mesh.vertices[t[2]])});
     for (uint32_t i = 0; i < shapes.size(); ++i) root.candidates.push_back(i);
 
-    Prover coarse(shapes, winding, size, stop);
+    Prover coarse(shapes, solid, size, stop);
     coarse.proof.covered = true;
     std::vector<Cell> cells;
     cells.push_back(std::move(root));
@@ -336,7 +367,7 @@ LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Wi
     std::atomic<size_t> done = 0;
     std::mutex reporting;
     tbb::parallel_for(size_t{0}, cells.size(), [&](size_t i) {
-        Prover prover(shapes, winding, size, stop);
+        Prover prover(shapes, solid, size, stop);
         prover.proof.covered = true;
         prover.prove(cells[i]);
         proofs[i] = prover.proof;
@@ -363,23 +394,23 @@ LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Wi
 Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options) {
     auto cleaned = clean(mesh);
     if (!cleaned) return cleaned.error();
-    const MeshView solid = cleaned->mesh.view();
+    const MeshView surface = cleaned->mesh.view();
 
     VerifyReport report;
     report.surface_mode = !cleaned->report.closed;
     if (tree.has_triangles()) {
-        verify_exact(tree, solid, report);
+        verify_exact(tree, surface, report);
         return report;
     }
     Box box;
-    for (const Vec3& v : solid.vertices) box.add(to_vec(v));
+    for (const Vec3& v : surface.vertices) box.add(to_vec(v));
     const double size = box.size().norm();
     const double rounding = kTolerance * std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff());
     // Not the mesh's own box: halving that one would cut symmetric models in their planes of symmetry.
     box.low -= 0.0137 * Vec::Constant(size);
     box.high += 0.0171 * Vec::Constant(size);
-    std::optional<Winding> winding;
-    if (!report.surface_mode && !tree.bake_info().exact) winding.emplace(solid);
+    std::optional<ClosedSolid> solid;
+    if (!report.surface_mode && !tree.bake_info().exact) solid.emplace(surface);
 
     std::atomic<bool> stop = false;
     tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
@@ -393,7 +424,7 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
         if (options.progress) level_progress = progress;
         LevelProof proof;
         arena.execute(
-            [&] { proof = prove_level(shapes, solid, winding ? &*winding : nullptr, box, level_progress, stop); });
+            [&] { proof = prove_level(shapes, surface, solid ? &*solid : nullptr, box, level_progress, stop); });
         if (stop) return Error{ErrorCode::cancelled, "cancelled", 0};
         report.covered = report.covered && proof.covered;
         report.levels.push_back(proof);

@@ -80,6 +80,7 @@ BakeInfo golden_info() {
             .alpha = 0.25f,
             .beta = 0.75f,
             .tolerance = 0.125f,
+            .distance = 1.5f,
             .levels = 2,
             .ellipsoids = 9,
             .seed = 42,
@@ -266,6 +267,7 @@ TEST(Format, GoldenFileOfVersionTwo) {
     EXPECT_EQ(info.alpha, expected.alpha);
     EXPECT_EQ(info.beta, expected.beta);
     EXPECT_EQ(info.tolerance, expected.tolerance);
+    EXPECT_EQ(info.distance, expected.distance);
     EXPECT_EQ(info.levels, expected.levels);
     EXPECT_EQ(info.ellipsoids, expected.ellipsoids);
     EXPECT_EQ(info.seed, expected.seed);
@@ -409,7 +411,7 @@ TEST(Format, NamesTheFirstOffence) {
         {12, {3}, ErrorCode::bad_file, 116},                              // exact, without triangles
         {128, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 128},  // infinite diagonal
         {136, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 136},              // negative error
-        {143, {1}, ErrorCode::bad_file, 140},                             // reserved
+        {140, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 140},              // distance not a number
         {kTable, {1}, ErrorCode::bad_file, kTable},                       // first node of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
