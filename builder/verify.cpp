@@ -33,6 +33,7 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 namespace prolate {
@@ -138,7 +139,7 @@ public:
         return !proof.covered;
     }
 
-    void prove(Cell& cell, int depth = 0) {
+    void prove(Cell& cell) {
         if (stop_.load(std::memory_order_relaxed) || settled(cell)) return;
         if (cell.box.size().maxCoeff() < kSmallestBox * size_ || proof.pieces > kPiecesPerTask) {
             give_up(cell.box.center());
@@ -147,7 +148,7 @@ public:
         std::array<Cell, 8> parts = cut(cell);
         cell = {}; // the memory is not needed on the way down
         for (Cell& part : parts) {
-            prove(part, depth + 1);
+            prove(part);
             if (!proof.covered) return;
         }
     }
@@ -335,41 +336,38 @@ std::vector<Shape> shapes_of(const TreeView& tree, double rounding) {
     return shapes;
 }
 
-LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const ClosedSolid* solid, const Box& box,
-                       const std::function<bool(double)>& progress, std::atomic<bool>& stop) {
-    const double size = box.size().norm();
-    // Cut down to enough boxes for the threads, settling on the way what can be.
-    Cell root;
-    root.box = box;
+// The space around the solid in enough boxes for the threads, with the surface in each.
+std::vector<Cell> cut_space(MeshView mesh, const Box& box) {
+    std::vector<Cell> cells(1);
+    cells[0].box = box;
     for (const Triangle& t : mesh.triangles)
-        root.polygons.push_back(
+        cells[0].polygons.push_back(
             {to_vec(mesh.vertices[t[0]]), to_vec(mesh.vertices[t[1]]), to_vec(mesh.vertices[t[2]])});
-    for (uint32_t i = 0; i < shapes.size(); ++i) root.candidates.push_back(i);
-
-    Prover coarse(shapes, solid, size, stop);
-    coarse.proof.covered = true;
-    std::vector<Cell> cells;
-    cells.push_back(std::move(root));
     for (int level = 0; level < kTaskLevels; ++level) {
-        std::vector<Cell> next;
-        for (Cell& cell : cells) {
-            if (coarse.settled(cell)) {
-                if (!coarse.proof.covered) return coarse.proof;
-                continue;
-            }
-            for (Cell& part : Prover::cut(cell)) next.push_back(std::move(part));
-            cell = {};
-        }
-        cells.swap(next);
+        std::vector<Cell> parts(8 * cells.size());
+        tbb::parallel_for(size_t{0}, cells.size(), [&](size_t i) {
+            std::array<Cell, 8> cut = Prover::cut(cells[i]);
+            std::move(cut.begin(), cut.end(), parts.begin() + static_cast<std::ptrdiff_t>(8 * i));
+            cells[i] = {};
+        });
+        cells.swap(parts);
     }
+    return cells;
+}
 
+LevelProof prove_level(const std::vector<Shape>& shapes, const std::vector<Cell>& cells, const ClosedSolid* solid,
+                       double size, const std::function<bool(double)>& progress, std::atomic<bool>& stop) {
+    std::vector<uint32_t> everyone(shapes.size());
+    std::iota(everyone.begin(), everyone.end(), 0u);
     std::vector<LevelProof> proofs(cells.size());
     std::atomic<size_t> done = 0;
     std::mutex reporting;
     tbb::parallel_for(size_t{0}, cells.size(), [&](size_t i) {
         Prover prover(shapes, solid, size, stop);
         prover.proof.covered = true;
-        prover.prove(cells[i]);
+        Cell cell = cells[i];
+        cell.candidates = everyone;
+        prover.prove(cell);
         proofs[i] = prover.proof;
         const size_t finished = ++done;
         if (progress && finished % 8 == 0) {
@@ -377,7 +375,8 @@ LevelProof prove_level(const std::vector<Shape>& shapes, MeshView mesh, const Cl
             if (!progress(static_cast<double>(finished) / static_cast<double>(cells.size()))) stop = true;
         }
     });
-    LevelProof total = coarse.proof;
+    LevelProof total;
+    total.covered = true;
     for (const LevelProof& p : proofs) { // the first failure in a fixed order: the same for any number of threads
         total.pieces += p.pieces;
         if (total.covered && !p.covered) {
@@ -414,6 +413,7 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
 
     std::atomic<bool> stop = false;
     tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
+    const std::vector<Cell> cells = arena.execute([&] { return cut_space(surface, box); });
     std::vector<Shape> all = shapes_of(tree, rounding);
     report.covered = true;
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
@@ -422,9 +422,8 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
         const auto progress = [&](double fraction) { return options.progress((l + fraction) / tree.level_count()); };
         std::function<bool(double)> level_progress;
         if (options.progress) level_progress = progress;
-        LevelProof proof;
-        arena.execute(
-            [&] { proof = prove_level(shapes, surface, solid ? &*solid : nullptr, box, level_progress, stop); });
+        const LevelProof proof = arena.execute(
+            [&] { return prove_level(shapes, cells, solid ? &*solid : nullptr, size, level_progress, stop); });
         if (stop) return Error{ErrorCode::cancelled, "cancelled", 0};
         report.covered = report.covered && proof.covered;
         report.levels.push_back(proof);
