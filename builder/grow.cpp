@@ -302,6 +302,13 @@ private:
         std::vector<std::vector<uint32_t>> pieces(solved.set.fits.size());
         for (uint32_t piece = 0; piece < solved.owner.size(); ++piece) pieces[solved.owner[piece]].push_back(piece);
         for (const uint32_t p : parents) grown_.nodes[p].pieces.clear();
+        for (size_t p = 0; p < solved.set.chains.size(); ++p) { // the polish may have enlarged them
+            uint32_t node = parents[p];
+            for (const Fit& fit : solved.set.chains[p]) {
+                if (fit.volume() > grown_.nodes[node].fit.volume()) grown_.nodes[node].fit = fit;
+                node = grown_.nodes[node].parent;
+            }
+        }
         std::vector<uint32_t> added;
         for (uint32_t p = 0; p < parents.size(); ++p) {
             grown_.nodes[parents[p]].first_child = static_cast<uint32_t>(grown_.nodes.size());

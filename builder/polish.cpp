@@ -1,5 +1,6 @@
 #include "builder/polish.hpp"
 
+#include "builder/cover.hpp"
 #include "builder/random.hpp"
 
 #include <tbb/blocked_range.h>
@@ -20,6 +21,7 @@ constexpr double kMargin = 1.2;       // ellipsoids may grow so much before neig
 constexpr int kNeighbourInterval = 4; // sweeps
 constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
 constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
+constexpr double kAncestorCost = 10; // of a volume by which an ancestor grows: all its descendants' queries meet it
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -152,8 +154,7 @@ private:
                 find_held(i);
             }
         });
-        holders_.assign(pieces_.size(), 0);
-        for (size_t i = 0; i < fits_.size(); ++i) count(i, +1);
+        count_holders();
 
         std::vector<size_t> group(fits_.size());
         groups_.clear();
@@ -173,28 +174,50 @@ private:
         for (size_t c = 0; c < candidates_[i].size(); ++c)
             held_[i][c] = holds(fits_[i], shortest_inverse, pieces_, candidates_[i][c]);
     }
+    void count_holders() {
+        holders_.assign(pieces_.size(), 0);
+        for (size_t i = 0; i < fits_.size(); ++i) count(i, +1);
+    }
     void count(size_t i, int by) {
         for (size_t c = 0; c < candidates_[i].size(); ++c)
             if (held_[i][c]) holders_[candidates_[i][c]] = static_cast<uint16_t>(holders_[candidates_[i][c]] + by);
     }
 
-    // A piece that nobody holds goes to the ellipsoid that has to grow least.
+    // A piece that nobody holds goes to the ellipsoid whose growth costs the least volume; that may be one whose
+    // ancestors have to grow, too.
     void adopt_orphans() {
-        std::vector<double> nearest(pieces_.size(), HUGE_VAL);
+        std::vector<double> least(pieces_.size(), HUGE_VAL);
+        const double far = kMargin * kMargin * kMargin - 1;
         const auto offer = [&](uint32_t i, uint32_t piece) {
-            const double reach = fits_[i].reach(pieces_.points(piece));
-            if (reach < nearest[piece]) nearest[piece] = reach, needed_by_[piece] = i;
+            double growth = growth_of(fits_[i], piece);
+            for (const Fit& ancestor : set_.chain(i)) growth += kAncestorCost * growth_of(ancestor, piece);
+            if (growth < least[piece]) least[piece] = growth, needed_by_[piece] = i;
         };
         for (uint32_t i = 0; i < fits_.size(); ++i)
-            for (const uint32_t piece : candidates_[i])
+            pieces_.for_each_near(box_of(fits_[i], kMargin), [&](uint32_t piece) {
                 if (holders_[piece] == 0) offer(i, piece);
+            });
         for (uint32_t piece = 0; piece < pieces_.size(); ++piece) {
-            if (holders_[piece] > 0 || needed_by_[piece] != kNobody) continue;
-            for (uint32_t i = 0; i < fits_.size(); ++i)
-                if (chain_holds(set_, i, pieces_, piece)) offer(i, piece);
-            if (needed_by_[piece] != kNobody) candidates_[needed_by_[piece]].push_back(piece);
+            if (holders_[piece] > 0) continue;
+            if (needed_by_[piece] == kNobody || least[piece] > far * fits_[needed_by_[piece]].volume()) // look at all
+                for (uint32_t i = 0; i < fits_.size(); ++i) offer(i, piece);
+            const uint32_t i = needed_by_[piece];
+            candidates_[i].push_back(piece);
+            if (set_.parent.empty()) continue;
+            for (Fit& ancestor : set_.chains[set_.parent[i]])
+                if (const double reach = ancestor.reach(pieces_.points(piece)); reach > 1)
+                    ancestor = ancestor.scaled(reach * (1 + kSlack));
         }
-        for (size_t i = 0; i < fits_.size(); ++i) held_[i].resize(candidates_[i].size(), false);
+        for (size_t i = 0; i < fits_.size(); ++i) {
+            std::sort(candidates_[i].begin(), candidates_[i].end());
+            candidates_[i].erase(std::unique(candidates_[i].begin(), candidates_[i].end()), candidates_[i].end());
+            find_held(i);
+        }
+        count_holders();
+    }
+    double growth_of(const Fit& fit, uint32_t piece) const {
+        const double reach = std::max(1.0, fit.reach(pieces_.points(piece)));
+        return fit.volume() * (reach * reach * reach - 1);
     }
 
     std::vector<uint32_t> held_alone(size_t i) const {

@@ -32,7 +32,8 @@ struct PolishOptions {
 /// pieces get: seams between ellipsoids become fine, everything else stays coarse.
 void refine_seams(Pieces& pieces, const EllipsoidSet& set);
 
-/// Makes `set` cover all pieces and lowers its error. Returns each piece's owner: the ellipsoid that holds it most
+/// Makes `set` cover all pieces and lowers its error. Ancestors in the chains grow a little where that spares a child
+/// much: pieces on the seams of parents. Returns each piece's owner: the ellipsoid that holds it most
 /// centrally, itself and all of its chain. An ellipsoid that the others make redundant owns nothing.
 std::vector<uint32_t> polish(EllipsoidSet& set, const Pieces& pieces, const DistanceField& field,
                              const PolishOptions& options);
