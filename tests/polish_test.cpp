@@ -191,6 +191,40 @@ std::vector<Fit> inflated(const EllipsoidSet& set, const Pieces& pieces) {
     return out;
 }
 
+TEST(MergeGroups, PartitionsWithinTheLimit) {
+    // Points in a row: what is next to each other fits together.
+    constexpr uint32_t kCount = 40;
+    std::vector<Sketch> row;
+    std::vector<std::vector<uint32_t>> touching(kCount);
+    for (uint32_t i = 0; i < kCount; ++i) {
+        const double x = i + 0.3 * std::sin(7.0 * i);
+        row.emplace_back(std::vector<Vec>{{x, 0, 0}, {x + 1, 0.5, 0}, {x + 1, 0, 0.5}});
+        if (i > 0) touching[i] = {i - 1};
+    }
+    const auto volume = [](const Fit& fit) { return fit.volume(); };
+    for (const bool connected : {true, false}) // without neighbours, everybody is one
+        for (const uint32_t k : {1u, 2u, 7u, 39u, 40u, 41u})
+            for (const size_t most : {size_t{1}, size_t{6}, size_t{12}, size_t{40}}) {
+                const auto neighbours = connected ? touching : std::vector<std::vector<uint32_t>>(kCount);
+                const auto groups = merge_groups(row, neighbours, k, most, kMinRadius, volume);
+                ASSERT_EQ(groups.size(), std::min(k, kCount));
+                std::vector<uint32_t> seen(kCount, 0);
+                size_t largest = 0;
+                for (const auto& group : groups) {
+                    EXPECT_TRUE(std::is_sorted(group.begin(), group.end()));
+                    largest = std::max(largest, group.size());
+                    for (const uint32_t member : group) ++seen.at(member);
+                    if (connected && most >= kCount) {
+                        EXPECT_EQ(group.back() - group.front() + 1, group.size());
+                    }
+                }
+                EXPECT_EQ(seen, std::vector<uint32_t>(kCount, 1));
+                if (most * k >= 2 * kCount) { // then it can be kept, see kMostShare in grow.cpp
+                    EXPECT_LE(largest, most);
+                }
+            }
+}
+
 TEST(Polish, CoversAllPiecesWithLessThanTheInflatedStart) {
     for (const auto& scene : scenes())
         for (const Primitive primitive : {Primitive::ellipsoid, Primitive::sphere})
