@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 namespace prolate {
@@ -26,6 +27,7 @@ constexpr double kShapeScale = 0.35, kThinShapeScale = 0.1;
 constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
 constexpr double kMostShare = 2; // of a child's leaves, times its equal share of its parent's; the two smallest of
 constexpr double kMostShareOfAll = 2.0 / 3; // degree + 1 parts have less: such parts are always found
+constexpr size_t kMostUnits = 512;          // that merge into the groups of a node; of more leaves, some are one unit
 constexpr double kReheat = 10;              // kappa at the start of a cycle
 constexpr int kRounds = 12;                 // at most, of a search for the count that meets a limit
 constexpr double kMet = 0.999;              // of a limit: quantisation will add a little
@@ -486,7 +488,7 @@ private:
         // Breadth-first, so that the children of a node are consecutive.
         struct Group {
             uint32_t node;
-            std::vector<uint32_t> members; // leaves, rising
+            std::vector<uint32_t> members; // leaves
         };
         std::vector<Group> groups(1);
         groups[0].node = 0;
@@ -496,7 +498,7 @@ private:
         for (uint32_t level = 1; !groups.empty(); ++level) {
             std::vector<std::vector<std::vector<uint32_t>>> parts(groups.size());
             tbb::parallel_for(size_t{0}, groups.size(),
-                              [&](size_t g) { parts[g] = parts_of(groups[g].members, sketches, touching); });
+                              [&](size_t g) { parts[g] = parts_of(groups[g].members, fits, sketches, touching); });
             std::vector<Group> next;
             for (size_t g = 0; g < groups.size(); ++g) {
                 const uint32_t parent = groups[g].node;
@@ -525,25 +527,41 @@ private:
     }
 
     // Some leaves in as many groups as a node has children, none of them much larger than its share, if that can be.
-    std::vector<std::vector<uint32_t>> parts_of(std::span<const uint32_t> leaves, std::span<const Sketch> sketches,
+    std::vector<std::vector<uint32_t>> parts_of(const std::vector<uint32_t>& members, std::span<const Fit> fits,
+                                                std::span<const Sketch> sketches,
                                                 std::span<const std::vector<uint32_t>> touching) const {
+        const std::vector<std::vector<uint32_t>> units = halved(members, fits, std::min(members.size(), kMostUnits));
+        std::vector<Sketch> own(units.size());
+        std::map<uint32_t, uint32_t> unit_of; // of each leaf
+        for (uint32_t unit = 0; unit < units.size(); ++unit)
+            for (const uint32_t leaf : units[unit]) own[unit].add(sketches[leaf]), unit_of[leaf] = unit;
+        std::vector<std::vector<uint32_t>> neighbours(units.size());
+        for (const auto& [leaf, unit] : unit_of)
+            for (const uint32_t other : touching[leaf])
+                if (const auto found = unit_of.find(other); found != unit_of.end() && found->second != unit)
+                    neighbours[unit].push_back(found->second);
+
         const uint32_t degree = options_.build.degree;
         const double share = std::min(kMostShare / degree, kMostShareOfAll);
-        const auto most = static_cast<size_t>(std::ceil(share * static_cast<double>(leaves.size())));
-        std::vector<Sketch> own;
-        std::vector<std::vector<uint32_t>> neighbours(leaves.size());
-        for (size_t i = 0; i < leaves.size(); ++i) {
-            own.push_back(sketches[leaves[i]]);
-            for (const uint32_t other : touching[leaves[i]]) {
-                const auto found = std::lower_bound(leaves.begin(), leaves.end(), other);
-                if (found != leaves.end() && *found == other)
-                    neighbours[i].push_back(static_cast<uint32_t>(found - leaves.begin()));
-            }
+        const auto most = static_cast<size_t>(std::ceil(share * static_cast<double>(units.size())));
+        std::vector<std::vector<uint32_t>> parts;
+        for (const std::vector<uint32_t>& group :
+             merge_groups(own, neighbours, degree, most, options_.min_radius, outside_volume_)) {
+            std::vector<uint32_t>& part = parts.emplace_back();
+            for (const uint32_t unit : group) part.insert(part.end(), units[unit].begin(), units[unit].end());
         }
-        auto parts = merge_groups(own, neighbours, degree, most, options_.min_radius, outside_volume_);
-        for (std::vector<uint32_t>& part : parts)
-            for (uint32_t& member : part) member = leaves[member];
         return parts;
+    }
+
+    // Leaves in `count` units of about the same size, by place.
+    static std::vector<std::vector<uint32_t>> halved(const std::vector<uint32_t>& leaves, std::span<const Fit> fits,
+                                                     size_t count) {
+        if (count == 1) return {leaves};
+        const auto [low, high] = divide(
+            leaves, [&](uint32_t leaf) { return fits[leaf].center; }, leaves.size() * (count / 2) / count);
+        std::vector<std::vector<uint32_t>> out = halved(low, fits, count / 2);
+        for (std::vector<uint32_t>& unit : halved(high, fits, count - count / 2)) out.push_back(std::move(unit));
+        return out;
     }
 
     const Solid& solid_;
