@@ -338,11 +338,10 @@ private:
         report_.title(fmt::format("{}: quality {}; x: against alpha = 0", path, a_.quality));
         for (const uint32_t count : a_.counts) {
             Reference reference;
-            for (const float alpha : {0.0f, 0.1f, 0.5f, 0.9f, 1.0f}) {
+            for (const float alpha : {0.0f, 1.0f, 10.0f, 100.0f, 1000.0f}) {
                 BuildOptions options = base_;
-                options.alpha = alpha, options.beta = 1 - alpha;
-                const Json row = bake(path, options, count,
-                                      fmt::format("alpha {:.1f}, beta {:.1f}", options.alpha, options.beta), reference);
+                options.alpha = alpha, options.beta = 1;
+                const Json row = bake(path, options, count, fmt::format("alpha {:g}, beta 1", alpha), reference);
                 if (alpha == 0) reference = reference_of(row);
             }
         }
@@ -436,7 +435,7 @@ int main(int argc, char** argv) {
     auto* levels = app.add_option("--levels", a.levels, "instead: each level of a tree against a flat set")
                        ->check(CLI::Range(1, 10));
     auto* compare = app.add_flag("--compare-methods", a.compare_methods, "instead: voxel against analytic");
-    auto* trade = app.add_flag("--trade", a.trade, "instead: alpha = 0, 0.1, 0.5, 0.9, 1 with beta = 1 - alpha");
+    auto* trade = app.add_flag("--trade", a.trade, "instead: alpha = 0, 1, 10, 100, 1000 with beta = 1");
     levels->excludes(compare)->excludes(trade), compare->excludes(trade);
     app.add_option("--alpha", a.alpha)->capture_default_str();
     app.add_option("--beta", a.beta)->capture_default_str();
