@@ -397,10 +397,20 @@ private:
             }
             const auto place = [&](uint32_t piece) { return pieces_.center(piece); };
             auto [a, b] = divide(largest->pieces, place, largest->pieces.size() / 2);
-            *largest = {fit_around(a), a};
-            leaves.push_back({fit_around(b), b});
+            const Fit whole = largest->fit;
+            *largest = {part_of(whole, a), a};
+            leaves.push_back({part_of(whole, b), b});
         }
         return leaves;
+    }
+
+    // For some of the pieces that `whole` holds: a fit of their own, or, if that sticks out more, a smaller `whole`.
+    Fit part_of(const Fit& whole, std::span<const uint32_t> pieces) const {
+        double reach = 0;
+        for (const uint32_t piece : pieces) reach = std::max(reach, whole.reach(pieces_.points(piece)));
+        const Fit smaller = whole.scaled(reach), own = fit_around(pieces);
+        return within_caps(smaller, options_.min_radius) && outside_volume_(smaller) < outside_volume_(own) ? smaller
+                                                                                                            : own;
     }
 
     Fit fit_around(std::span<const uint32_t> pieces) const {
