@@ -51,8 +51,6 @@ Published published(const std::string& model, uint32_t triangles, uint32_t count
     return {"", 0, 0, kNone, kNone, kNone, kNone};
 }
 
-const std::map<std::string, Quality> kQualities{
-    {"fast", Quality::fast}, {"normal", Quality::normal}, {"best", Quality::best}};
 const std::map<std::string, Method> kMethods{{"voxel", Method::voxel}, {"analytic", Method::analytic}};
 const std::map<std::string, Primitive> kPrimitives{{"ellipsoid", Primitive::ellipsoid}, {"sphere", Primitive::sphere}};
 

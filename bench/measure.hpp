@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstdio>
+#include <map>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -17,6 +18,10 @@
 namespace prolate::bench {
 
 inline constexpr double kUnknown = LevelFigures::kUnknown;
+
+/// Qualities by their names on a command line.
+inline const std::map<std::string, Quality> kQualities{
+    {"fast", Quality::fast}, {"normal", Quality::normal}, {"best", Quality::best}};
 
 /// What a piece of work took. Peak memory is the process's: of the whole, loading included.
 struct Cost {

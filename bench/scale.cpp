@@ -26,9 +26,6 @@ struct Arguments {
     uint32_t degree = 8, threads = 0;
 };
 
-const std::map<std::string, Quality> kQualities{
-    {"fast", Quality::fast}, {"normal", Quality::normal}, {"best", Quality::best}};
-
 constexpr const char* kHead = "model,triangles,mode,quality,asked,nodes,leaves,outside_ratio,cpu_seconds,wall_seconds,"
                               "voxelise_seconds,fit_seconds,measure_seconds,prove_seconds,megabytes,bytes,resolution\n";
 

@@ -25,11 +25,7 @@ std::optional<format::PackedNode> covering_node(const Fit& fit, const format::La
 
 std::optional<format::PackedNode> covering_node(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members,
                                                 const format::Lattice& lattice) {
-    return covering_node(fit, lattice, [&](const Fit& decoded) {
-        double reach = 0;
-        for (const uint32_t piece : members) reach = std::max(reach, decoded.reach(pieces.points(piece)));
-        return reach;
-    });
+    return covering_node(fit, lattice, [&](const Fit& decoded) { return reach_of(decoded, pieces, members); });
 }
 
 double surface_error(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members) {

@@ -146,11 +146,13 @@ private:
         return volume.outside.value + kUncoveredWeight * uncovered;
     }
 
-    CoverVolume measure(std::span<const Fit> fits) const {
-        std::vector<Ellipsoid> ellipsoids;
-        for (const Fit& fit : fits) ellipsoids.push_back(fit.ellipsoid());
-        return measure_cover(solid_.columns, ellipsoids);
+    static std::vector<Ellipsoid> ellipsoids_of(std::span<const Fit> fits) {
+        std::vector<Ellipsoid> out;
+        out.reserve(fits.size());
+        for (const Fit& fit : fits) out.push_back(fit.ellipsoid());
+        return out;
     }
+    CoverVolume measure(std::span<const Fit> fits) const { return measure_cover(solid_.columns, ellipsoids_of(fits)); }
     double outside_of(std::span<const Fit> fits) const { return measure(fits).outside.value; }
 
     EllipsoidSet start_set(const Task& task, int start, std::vector<uint32_t>& owner) const {
@@ -406,18 +408,14 @@ private:
 
     // For some of the pieces that `whole` holds: a fit of their own, or, if that sticks out more, a smaller `whole`.
     Fit part_of(const Fit& whole, std::span<const uint32_t> pieces) const {
-        double reach = 0;
-        for (const uint32_t piece : pieces) reach = std::max(reach, whole.reach(pieces_.points(piece)));
-        const Fit smaller = whole.scaled(reach), own = fit_around(pieces);
+        const Fit smaller = whole.scaled(reach_of(whole, pieces_, pieces)), own = fit_around(pieces);
         return within_caps(smaller, options_.min_radius) && outside_volume_(smaller) < outside_volume_(own) ? smaller
                                                                                                             : own;
     }
 
     Fit fit_around(std::span<const uint32_t> pieces) const {
         const Fit fit = as_primitive(fit_pieces(pieces_, pieces, options_.min_radius), options_.build.primitive);
-        double reach = 0;
-        for (const uint32_t piece : pieces) reach = std::max(reach, fit.reach(pieces_.points(piece)));
-        return fit.scaled(reach);
+        return fit.scaled(reach_of(fit, pieces_, pieces));
     }
 
     // The lower `count` of `items` along the longest side of their places' box, and the rest.
@@ -439,11 +437,8 @@ private:
         const BuildOptions& goal = options_.build;
         double out = 0;
         if (goal.tolerance > 0) out = outside_of(fits) / solid_volume_ / goal.tolerance;
-        if (goal.distance > 0) {
-            std::vector<Ellipsoid> cover;
-            for (const Fit& fit : fits) cover.push_back(fit.ellipsoid());
-            out = std::max(out, solid_.distance(cover) / (0.01 * goal.distance * options_.diagonal));
-        }
+        if (goal.distance > 0)
+            out = std::max(out, solid_.distance(ellipsoids_of(fits)) / (0.01 * goal.distance * options_.diagonal));
         return out;
     }
 

@@ -191,6 +191,12 @@ bool Pieces::refine(uint32_t piece) {
     return !first;
 }
 
+double reach_of(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members) {
+    double reach = 0;
+    for (const uint32_t piece : members) reach = std::max(reach, fit.reach(pieces.points(piece)));
+    return reach;
+}
+
 Fit fit_pieces(const Pieces& pieces, std::span<const uint32_t> members, double min_radius) {
     Sketch sketch;
     for (const uint32_t piece : members) sketch.add(pieces.points(piece));

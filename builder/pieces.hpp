@@ -115,4 +115,7 @@ private:
 /// again with what sticks out.
 Fit fit_pieces(const Pieces& pieces, std::span<const uint32_t> members, double min_radius);
 
+/// Largest radial coordinate of any point of these pieces: `fit` scaled by it holds them. 0 for no pieces.
+double reach_of(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members);
+
 } // namespace prolate

@@ -278,9 +278,7 @@ private:
             const Step step = nearest_admitted(wanted, constraints);
             next = moved(fit, step.head<3>(), shape_of(step, options_.primitive), options_.min_radius);
         }
-        double reach = 0;
-        for (const uint32_t piece : alone) reach = std::max(reach, next.reach(pieces_.points(piece)));
-        const double by = reach * (1 + 1e-9);
+        const double by = reach_of(next, pieces_, alone) * (1 + 1e-9);
         const Fit tight = next.scaled(by);
         return within_caps(tight, options_.min_radius) ? tight : next.scaled(std::max(by, 1.0));
     }
