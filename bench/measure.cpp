@@ -93,7 +93,7 @@ Baked bake(const std::string& path, const BuildOptions& options, int columns_acr
     }
     const TreeView tree = built->tree.view();
     out.nodes = tree.node_count(), out.level_count = tree.level_count();
-    for (uint32_t n = 0; n < out.nodes; ++n) out.leaves += tree.is_leaf(n);
+    tree.for_each_node([&](uint32_t n) { out.leaves += tree.is_leaf(n); });
     out.bytes = tree.bytes().size();
     out.outside_ratio = built->levels.back().outside_ratio;
     out.resolution = built->resolution, out.goal_reached = built->goal_reached;

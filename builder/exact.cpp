@@ -317,6 +317,9 @@ private:
         const auto [children, triangles] = std::pair(node.packed.child_count, node.packed.triangle_count);
         node.packed = *packed;
         node.packed.child_count = children, node.packed.triangle_count = triangles;
+        Box box;
+        for_each_corner(node, [&](const Vec& p) { box.add(p); });
+        for (int i = 0; i < 3; ++i) node.packed.box_low[i] = box.low[i], node.packed.box_high[i] = box.high[i];
     }
 
     void report(uint32_t triangles) {

@@ -323,8 +323,8 @@ private:
 };
 
 std::vector<Shape> shapes_of(const TreeView& tree, double rounding) {
-    std::vector<Shape> shapes(tree.node_count());
-    for (uint32_t node = 0; node < tree.node_count(); ++node) {
+    std::vector<Shape> shapes(tree.slot_count());
+    tree.for_each_node([&](uint32_t node) {
         Shape& shape = shapes[node];
         shape.fit = Fit(tree.ellipsoid(node));
         shape.shortest_inverse = shape.fit.inverse.norm();
@@ -332,7 +332,7 @@ std::vector<Shape> shapes_of(const TreeView& tree, double rounding) {
         shape.shrunk = margin > 0 ? margin * margin - 1e-14 : -1;
         const ChildRange children = tree.children(node);
         for (uint32_t c = 0; c < children.count; ++c) shapes[children.first + c].parent = &shape;
-    }
+    });
     return shapes;
 }
 

@@ -62,19 +62,19 @@ Doubt compare(const TreeView& tree, MeshView mesh) {
 
 // For each node, a corner beneath it that it does not hold.
 std::vector<Doubt> find_doubts(const TreeView& tree) {
-    const uint32_t nodes = tree.node_count();
-    std::vector<uint32_t> parent(nodes, 0);
-    std::vector<Ellipsoid> ellipsoids(nodes);
-    std::vector<double> largest(nodes); // squared radial coordinate within, beyond doubt
-    for (uint32_t n = 0; n < nodes; ++n) {
+    const uint32_t slots = tree.slot_count();
+    std::vector<uint32_t> parent(slots, 0);
+    std::vector<Ellipsoid> ellipsoids(slots);
+    std::vector<double> largest(slots); // squared radial coordinate within, beyond doubt
+    tree.for_each_node([&](uint32_t n) {
         const ChildRange children = tree.children(n);
         for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
         ellipsoids[n] = tree.ellipsoid(n);
         const Fit fit(ellipsoids[n]);
         largest[n] = 1 - kRounding * fit.factor.norm() * fit.inverse.norm();
-    }
-    std::vector<Doubt> doubts(nodes);
-    for (uint32_t leaf = 0; leaf < nodes; ++leaf) {
+    });
+    std::vector<Doubt> doubts(slots);
+    tree.for_each_node([&](uint32_t leaf) {
         const TriangleRange triangles = tree.triangles(leaf);
         for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
             for (const uint32_t corner : tree.triangle(t)) {
@@ -85,7 +85,7 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
                     if (node == 0) break;
                 }
             }
-    }
+    });
     return doubts;
 }
 

@@ -20,7 +20,7 @@ namespace {
 constexpr const char* kFooter = R"(
 The cut at a level (its nodes and the leaves above it) covers the solid. Without --level: csv holds the cut of every
 level, a leaf above it again for each; json holds every node once, with its own level; ply pictures the finest cut.
-With --level L: the cut at L. Of an exact tree, these are the ellipsoids, and json adds the triangles of each leaf, as
+With --level L: the cut at L. Nodes are named by their slots in the file, which have gaps. Of an exact tree, these are the ellipsoids, and json adds the triangles of each leaf, as
 places in the file's order.
 csv: level,cx,cy,cz,r1,r2,r3,R11,...,R33: center, radii, and the rotation row by row; its column i is the direction
 of radius i. ply: ellipsoids as meshes, their corners on the ellipsoids, one color for each child of the root.
@@ -55,7 +55,7 @@ Selection all_cuts(const TreeView& tree) {
 Selection all_nodes(const TreeView& tree) {
     Selection out;
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
-        for (uint32_t i = 0; i < tree.level(l).node_count; ++i) out.nodes.push_back(tree.level(l).first_node + i);
+        tree.for_each_node(l, [&out](uint32_t node) { out.nodes.push_back(node); });
         out.levels.resize(out.nodes.size(), l);
     }
     return out;
@@ -148,13 +148,13 @@ std::array<unsigned char, 3> color(uint32_t index) {
     return out;
 }
 
-// For each node the place of its level-1 ancestor among the root's children; 0 for the root.
+// For each node, by slot, the place of its level-1 ancestor among the root's children; 0 for the root.
 std::vector<uint32_t> families(const TreeView& tree) {
-    std::vector<uint32_t> family(tree.node_count(), 0);
-    for (uint32_t node = 0; node < tree.node_count(); ++node) { // parents come before children
+    std::vector<uint32_t> family(tree.slot_count(), 0);
+    tree.for_each_node([&](uint32_t node) { // parents come before children
         const ChildRange children = tree.children(node);
         for (uint32_t i = 0; i < children.count; ++i) family[children.first + i] = node == 0 ? i : family[node];
-    }
+    });
     return family;
 }
 

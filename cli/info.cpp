@@ -32,8 +32,9 @@ std::string as_json(const TreeView& tree) {
     out["levels"] = nlohmann::ordered_json::array();
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
         const LevelInfo level = tree.level(l);
-        nlohmann::ordered_json one{{"first_node", level.first_node},
+        nlohmann::ordered_json one{{"first_node", level.first_slot},
                                    {"nodes", level.node_count},
+                                   {"blocks", level.block_count},
                                    {"cut", cut_size(tree, l)},
                                    {"end_byte", level.end_byte}};
         one.update(level_json(tree, l));
@@ -47,8 +48,9 @@ std::string as_text(const std::string& name, const TreeView& tree) {
     std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", name, kFormatVersion,
                                   grouped(tree.bytes().size()));
     if (tree.is_prefix()) out += "  a prefix of a longer file: a coarser tree\n";
-    out += fmt::format("  nodes     {} in {} levels, degree {}\n", grouped(tree.node_count()), tree.level_count(),
-                       tree.degree());
+    out += fmt::format("  nodes     {} in {} levels, degree {}; {} blocks, {:.1f} bytes a node\n",
+                       grouped(tree.node_count()), tree.level_count(), tree.degree(), grouped(tree.block_count()),
+                       bytes_per_node(tree));
     if (tree.has_triangles())
         out += fmt::format("  exact     {} triangles on {} vertices, {} connected component{}\n",
                            grouped(tree.triangle_count()), grouped(tree.vertex_count()),

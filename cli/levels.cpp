@@ -42,6 +42,10 @@ uint32_t cut_size(const TreeView& tree, uint32_t level) {
     return count;
 }
 
+double bytes_per_node(const TreeView& tree) {
+    return static_cast<double>(kBlockBytes) * tree.block_count() / tree.node_count();
+}
+
 std::string level_table(const TreeView& tree, std::span<const double> seconds) {
     const BakeInfo info = tree.bake_info();
     std::string out = fmt::format("{:>26}{:>32}\n", "outside ratio", "% of the diagonal");
@@ -88,6 +92,8 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     nlohmann::ordered_json out;
     out["bytes"] = tree.bytes().size();
     out["nodes"] = tree.node_count();
+    out["blocks"] = tree.block_count();
+    out["bytes_per_node"] = bytes_per_node(tree);
     out["degree"] = tree.degree();
     out["exact"] = info.exact;
     out["triangles"] = tree.triangle_count(); // 0 in a prefix, as the next two

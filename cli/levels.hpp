@@ -13,6 +13,9 @@ namespace prolate::cli {
 /// Nodes of the cut at `level`.
 uint32_t cut_size(const TreeView& tree, uint32_t level);
 
+/// What the file spends on a node, empty lanes of its blocks included.
+double bytes_per_node(const TreeView& tree);
+
 /// One row a level, two lines of heading, at most 100 columns. `seconds` by level, if known.
 std::string level_table(const TreeView& tree, std::span<const double> seconds = {});
 

@@ -85,10 +85,9 @@ Oklch branch_colour(uint32_t i, uint32_t n) {
 }
 
 std::vector<Oklch> node_colours(const TreeView& tree) {
-    std::vector<Oklch> colours(tree.node_count(), kNeutral);
-    if (tree.node_count() == 0) return colours;
+    std::vector<Oklch> colours(tree.slot_count(), kNeutral);
     std::vector<Oklch> ancestor(colours);
-    for (uint32_t node = 0; node < tree.node_count(); ++node) {
+    tree.for_each_node([&](uint32_t node) {
         const ChildRange range = tree.children(node);
         for (uint32_t i = 0; i < range.count; ++i) {
             const uint32_t child = range.first + i;
@@ -102,7 +101,7 @@ std::vector<Oklch> node_colours(const TreeView& tree) {
             const double shift = 0.18 * (van_der_corput(i + 1) - 0.5);
             colours[child].lightness = std::clamp(ancestor[node].lightness + shift, 0.25, 0.93);
         }
-    }
+    });
     return colours;
 }
 

@@ -1,4 +1,4 @@
-// The .etree format: the only file, with format.cpp, that knows offsets. src/FORMAT.md is normative.
+// Writing .etree files (src/FORMAT.md is normative). TreeView reads them: open.cpp checks, tree.cpp decodes.
 //
 // A node's numbers are integers times powers of two, so that decoding is exact and the same everywhere:
 //     center = (origin + q) * 2^step_exponent           q: three uint16, |origin + q| < 2^24: exact in a float
@@ -15,25 +15,22 @@
 
 namespace prolate::format {
 
-/// The lattice that centers lie on.
-struct Lattice {
-    int32_t origin[3] = {};
-    int32_t step_exponent = 0;
-};
+using Lattice = LatticeInfo;
 
 inline constexpr int32_t kMaxCoordinate = 1 << 24; ///< |origin + q| stays below: integers that a float holds exactly
 inline constexpr int32_t kMinStepExponent = -120, kMaxStepExponent = 60;
 inline constexpr int32_t kMinNodeExponent = -100, kMaxNodeExponent = 100;
 
-/// A node as stored.
+/// A node as stored, but for the place of its children or triangles, which encode() finds.
 struct PackedNode {
-    uint32_t first_child = 0;
     uint16_t center[3] = {};
     uint16_t diagonal[3] = {1, 1, 1}; // l11, l22, l33
     int16_t off_diagonal[3] = {};     // l21, l31, l32
     int8_t exponent = 0;
     uint8_t child_count = 0;
-    uint8_t triangle_count = 0; // of a leaf of an exact tree; first_child is then its first triangle
+    // The node's box, metres: around its triangles if exact. Empty as here: around its ellipsoid.
+    double box_low[3] = {1, 1, 1}, box_high[3] = {0, 0, 0};
+    uint8_t triangle_count = 0; // of a leaf of an exact tree
 };
 
 /// Lattice for centers inside the box [low, high], all finite: the finest step for which 16 bits reach across and a
@@ -47,9 +44,12 @@ void quantise(PackedNode& node, const Lattice& lattice, const double center[3], 
 /// Exactly what TreeView::ellipsoid returns for the node.
 Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept;
 
+/// Stores the boxes of up to kBlockLanes siblings in their block, outward rounded.
+void store_boxes(std::byte* block, std::span<const PackedNode> siblings, const Lattice& lattice) noexcept;
+
 /// One level to be written.
 struct PackedLevel {
-    std::vector<PackedNode> nodes; ///< in order; children of earlier nodes first; first_child is filled by encode()
+    std::vector<PackedNode> nodes; ///< in order; children of earlier nodes first
     LevelFigures figures = {};
 };
 
@@ -60,8 +60,8 @@ struct PackedTriangles {
     uint32_t components = 0;
 };
 
-/// The bytes of a whole file; `triangles` are written if info.exact. Sets first_child from the counts of children and
-/// triangles. The caller keeps the invariants of FORMAT.md (counts that add up, degree and level limits).
+/// The bytes of a whole file; `triangles` are written if info.exact. Gives each family of siblings blocks of its own.
+/// The caller keeps the invariants of FORMAT.md (counts that add up, degree and level limits).
 std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
                               std::span<const PackedLevel> levels, const PackedTriangles& triangles = {});
 

@@ -36,7 +36,9 @@ using scenes::Random;
 using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
-constexpr size_t kTable = 144, kRow = 60, kNodes = kTable + 3 * kRow; // of the golden tree
+constexpr size_t kTable = 144, kRow = 60;
+constexpr size_t kBlocks = 384; // of the golden tree: 144 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256;
 constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
 
 std::vector<PackedLevel> golden_levels() {
@@ -63,7 +65,8 @@ std::vector<PackedLevel> golden_levels() {
 // The same tree with triangles in its leaves: a tetrahedron, and one triangle apart from it.
 constexpr Vec3 kGoldenVertices[] = {{0, 0, 0}, {5, 5, 5}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {6, 5, 5}, {5, 6, 5}};
 constexpr Triangle kGoldenTriangles[] = {{1, 5, 6}, {0, 3, 2}, {0, 2, 4}, {0, 4, 3}, {2, 3, 4}};
-constexpr uint8_t kGoldenLeaves[] = {1, 2, 1, 1}; // triangles of nodes 2 ... 5
+constexpr uint32_t kGoldenSlots[] = {0, 8, 9, 16, 17, 18}; // its nodes: one block a level
+constexpr uint8_t kGoldenLeaves[] = {1, 2, 1, 1};          // triangles of the last four, which are the leaves
 
 BakeInfo golden_info() {
     return {.source_hash = 0x0123456789abcdefu,
@@ -128,22 +131,32 @@ void expect_finite(const Ellipsoid& e) {
 void expect_sound(const TreeView& tree) {
     ASSERT_GE(tree.level_count(), 1u);
     ASSERT_LE(tree.level_count(), kMaxLevels);
-    uint32_t nodes = 0;
+    uint32_t nodes = 0, blocks = 0;
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
         const LevelInfo level = tree.level(l);
-        ASSERT_EQ(level.first_node, nodes);
+        ASSERT_EQ(level.first_slot, kBlockLanes * blocks);
+        ASSERT_TRUE(tree.is_node(level.first_slot));
+        uint32_t seen = 0;
+        tree.for_each_node(l, [&](uint32_t) { ++seen; });
+        ASSERT_EQ(level.node_count, seen);
         nodes += level.node_count;
+        blocks += level.block_count;
         for (const double figure :
              {level.outside_ratio, level.outside_ratio_error, level.sum_outside_ratio, level.union_volume,
               level.surface_error, level.hausdorff_max, level.hausdorff_mean, level.hausdorff_p99})
             ASSERT_TRUE(std::isnan(figure) || (std::isfinite(figure) && figure >= 0));
-        ASSERT_EQ(level.end_byte <= tree.bytes().size(), true);
+        ASSERT_LE(level.end_byte, tree.bytes().size());
+        ASSERT_EQ(tree.bytes().data() + level.end_byte, tree.block(0) + kBlockBytes * blocks);
     }
     ASSERT_EQ(nodes, tree.node_count());
+    ASSERT_EQ(blocks, tree.block_count());
+    ASSERT_EQ(tree.slot_count(), kBlockLanes * blocks);
+    ASSERT_EQ((tree.block(0) - tree.bytes().data()) % 64, 0);
     const BakeInfo info = tree.bake_info();
     ASSERT_EQ(tree.has_triangles(), info.exact && !tree.is_prefix());
-    uint32_t next = 1, next_triangle = 0;
-    for (uint32_t n = 0; n < nodes; ++n) {
+    uint32_t children_seen = 0, next_block = 1, next_triangle = 0;
+    for (uint32_t n = 0; n < tree.slot_count(); ++n) {
+        if (!tree.is_node(n)) continue;
         expect_finite(tree.ellipsoid(n));
         const ChildRange children = tree.children(n);
         const TriangleRange triangles = tree.triangles(n);
@@ -155,10 +168,15 @@ void expect_sound(const TreeView& tree) {
             next_triangle += triangles.count;
         }
         if (children.count == 0) continue;
-        ASSERT_EQ(children.first, next);
-        next += children.count;
+        ASSERT_EQ(children.first, kBlockLanes * next_block);
+        const uint32_t its_blocks = (children.count + kBlockLanes - 1) / kBlockLanes;
+        for (uint32_t i = 0; i < kBlockLanes * its_blocks; ++i)
+            ASSERT_EQ(tree.is_node(children.first + i), i < children.count);
+        children_seen += children.count;
+        next_block += its_blocks;
     }
-    ASSERT_EQ(next, nodes);
+    ASSERT_EQ(children_seen + 1, nodes);
+    ASSERT_EQ(next_block, blocks);
     ASSERT_EQ(next_triangle, tree.triangle_count());
     ASSERT_LE(tree.component_count(), tree.vertex_count());
     for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
@@ -172,9 +190,9 @@ void expect_sound(const TreeView& tree) {
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenExactFileOfVersionTwo) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v2_exact.etree");
-    ASSERT_EQ(file.size(), kNodes + 6 * kNodeBytes + 8 + 7 * 12 + 5 * 6);
+TEST(Format, GoldenExactFileOfVersionThree) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v3_exact.etree");
+    ASSERT_EQ(file.size(), kEnd + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
     ASSERT_TRUE(tree) << tree.error().what;
@@ -186,11 +204,11 @@ TEST(Format, GoldenExactFileOfVersionTwo) {
     ASSERT_EQ(tree->triangle_count(), std::size(kGoldenTriangles));
     for (uint32_t t = 0; t < tree->triangle_count(); ++t) EXPECT_EQ(tree->triangle(t), kGoldenTriangles[t]);
     EXPECT_EQ(tree->triangles(0).count, 0u);
-    for (uint32_t leaf = 2; leaf < 6; ++leaf) {
-        EXPECT_TRUE(tree->is_leaf(leaf));
-        EXPECT_EQ(tree->triangles(leaf).count, kGoldenLeaves[leaf - 2]);
+    for (size_t i = 0; i < 4; ++i) {
+        EXPECT_TRUE(tree->is_leaf(kGoldenSlots[i + 2]));
+        EXPECT_EQ(tree->triangles(kGoldenSlots[i + 2]).count, kGoldenLeaves[i]);
     }
-    EXPECT_EQ(tree->triangles(4).first, 3u);
+    EXPECT_EQ(tree->triangles(17).first, 3u);
 }
 
 TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
@@ -202,7 +220,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
         info.exact = true;
         PackedLevel root{{{.triangle_count = 1}}};
         const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
-        EXPECT_EQ(bytes.size(), kTable + kRow + kNodeBytes + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        EXPECT_EQ(bytes.size(), 256 + 256 + 8 + 12 * count + (count > 65536 ? 12 : 6));
         const auto tree = TreeView::open(bytes);
         ASSERT_TRUE(tree) << tree.error().what;
         EXPECT_EQ(tree->triangle(0), triangle);
@@ -210,14 +228,20 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
     }
 }
 
-TEST(Format, GoldenFileOfVersionTwo) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v2.etree");
-    ASSERT_EQ(file.size(), kNodes + 6 * kNodeBytes);
+TEST(Format, GoldenFileOfVersionThree) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v3.etree");
+    ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
     ASSERT_TRUE(tree) << tree.error().what;
     expect_sound(*tree);
     EXPECT_EQ(tree->node_count(), 6u);
+    EXPECT_EQ(tree->block_count(), 3u);
+    for (uint32_t slot = 0; slot < 24; ++slot)
+        EXPECT_EQ(tree->is_node(slot), std::ranges::count(kGoldenSlots, slot) == 1) << slot;
+    EXPECT_EQ(tree->block(1), file.data() + kBlock1);
+    EXPECT_TRUE(std::ranges::equal(tree->lattice().origin, kGoldenLattice.origin));
+    EXPECT_EQ(tree->lattice().step_exponent, kGoldenLattice.step_exponent);
     EXPECT_EQ(tree->level_count(), 3u);
     EXPECT_EQ(tree->degree(), 3u);
     EXPECT_FALSE(tree->is_prefix());
@@ -229,18 +253,21 @@ TEST(Format, GoldenFileOfVersionTwo) {
                                              2000 / 16384.f,
                                              -3000 / 16384.f,
                                              60000 / 32768.f}));
-    EXPECT_EQ(tree->ellipsoid(1), (Ellipsoid{{-30 / 16.f, 7 / 16.f, 1000 / 16.f},
+    EXPECT_EQ(tree->ellipsoid(8), (Ellipsoid{{-30 / 16.f, 7 / 16.f, 1000 / 16.f},
                                              1 / 65536.f,
                                              32767 / 32768.f,
                                              2 / 65536.f,
                                              -1.f,
                                              0.f,
                                              65535 / 65536.f}));
-    EXPECT_EQ(tree->children(0).first, 1u);
-    EXPECT_EQ(tree->children(1).first, 3u);
-    EXPECT_EQ(tree->children(1).count, 3u);
-    EXPECT_TRUE(tree->is_leaf(2));
-    EXPECT_EQ(tree->level(1).end_byte, kNodes + 3 * kNodeBytes);
+    EXPECT_EQ(tree->children(0).first, 8u);
+    EXPECT_EQ(tree->children(8).first, 16u);
+    EXPECT_EQ(tree->children(8).count, 3u);
+    EXPECT_TRUE(tree->is_leaf(9));
+    EXPECT_EQ(tree->level(1).first_slot, 8u);
+    EXPECT_EQ(tree->level(1).block_count, 1u);
+    EXPECT_EQ(tree->level(1).node_count, 2u);
+    EXPECT_EQ(tree->level(1).end_byte, kBlock2);
     const LevelInfo level = tree->level(1);
     EXPECT_EQ(level.outside_ratio, 1.25);
     EXPECT_EQ(level.outside_ratio_error, 0.0625);
@@ -287,14 +314,62 @@ TEST(Format, FlagsDecodeByThemselves) {
     }
 }
 
+// The places of a block's numbers, as vector code loads them.
+TEST(Format, ABlockIsAStructureOfArrays) {
+    const Bytes bytes = golden_exact();
+    const auto expect_row = [&](size_t at, size_t width, const std::vector<int64_t>& lanes) {
+        for (size_t lane = 0; lane < 8; ++lane) {
+            const auto value = static_cast<uint64_t>(lane < lanes.size() ? lanes[lane] : 0);
+            for (size_t i = 0; i < width; ++i)
+                EXPECT_EQ(bytes[at + width * lane + i], std::byte(value >> (8 * i) & 0xff)) << at << " lane " << lane;
+        }
+    };
+    expect_row(kBlock1 + 0, 2, {0, 65535}); // center
+    expect_row(kBlock1 + 16, 2, {0, 1});
+    expect_row(kBlock1 + 32, 2, {0, 2});
+    expect_row(kBlock1 + 48, 2, {1, 300}); // diagonal
+    expect_row(kBlock1 + 64, 2, {2, 200});
+    expect_row(kBlock1 + 80, 2, {65535, 100});
+    expect_row(kBlock1 + 96, 2, {32767}); // off-diagonal
+    expect_row(kBlock1 + 112, 2, {-32768});
+    expect_row(kBlock1 + 128, 2, {});
+    expect_row(kBlock1 + 144, 1, {0, -7});  // exponent
+    expect_row(kBlock1 + 152, 1, {3, 129}); // three children; a leaf of one triangle
+    expect_row(kBlock1 + 160, 4, {16, 0});  // slot of the first child; first triangle
+    expect_row(kBlock2 + 152, 1, {130, 129, 129});
+    expect_row(kBlock2 + 160, 4, {1, 3, 4});
+}
+
+TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
+    const PackedNode leaf{.diagonal = {7, 7, 7}};
+    std::vector<PackedLevel> levels(3);
+    levels[0].nodes = {{.child_count = 3}};
+    levels[1].nodes = {{.child_count = 9}, leaf, {.child_count = 8}};
+    levels[2].nodes.assign(17, leaf);
+    const Bytes bytes = format::encode({}, 9, {}, levels);
+    const auto tree = TreeView::open(bytes);
+    ASSERT_TRUE(tree) << tree.error().what;
+    expect_sound(*tree);
+    EXPECT_EQ(tree->block_count(), 5u); // one, one, and two and one
+    EXPECT_EQ(tree->node_count(), 21u);
+    EXPECT_EQ(tree->children(8).first, 16u);
+    EXPECT_EQ(tree->children(8).count, 9u);
+    EXPECT_EQ(tree->children(10).first, 32u);
+    std::vector<uint32_t> last;
+    tree->for_each_node(2, [&](uint32_t n) { last.push_back(n); });
+    EXPECT_EQ(last, (std::vector<uint32_t>{16, 17, 18, 19, 20, 21, 22, 23, 24, 32, 33, 34, 35, 36, 37, 38, 39}));
+}
+
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v1.etree");
-    ASSERT_FALSE(file.empty());
-    for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
-        const auto tree = TreeView::open(file, options);
-        ASSERT_FALSE(tree);
-        EXPECT_EQ(tree.error().code, ErrorCode::bad_file);
-        EXPECT_STREQ(tree.error().what, "written by an older format version than this library reads");
+    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree"}) {
+        const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
+        ASSERT_FALSE(file.empty());
+        for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
+            const auto tree = TreeView::open(file, options);
+            ASSERT_FALSE(tree);
+            EXPECT_EQ(tree.error().code, ErrorCode::bad_file);
+            EXPECT_STREQ(tree.error().what, "written by an older format version than this library reads");
+        }
     }
 }
 
@@ -307,8 +382,11 @@ TEST(Format, CutsTakeLeavesFromAbove) {
         return nodes;
     };
     EXPECT_EQ(cut(0), (std::vector<uint32_t>{0}));
-    EXPECT_EQ(cut(1), (std::vector<uint32_t>{1, 2}));
-    EXPECT_EQ(cut(2), (std::vector<uint32_t>{2, 3, 4, 5}));
+    EXPECT_EQ(cut(1), (std::vector<uint32_t>{8, 9}));
+    EXPECT_EQ(cut(2), (std::vector<uint32_t>{9, 16, 17, 18}));
+    std::vector<uint32_t> all;
+    tree.for_each_node([&](uint32_t n) { all.push_back(n); });
+    EXPECT_TRUE(std::ranges::equal(all, kGoldenSlots));
 }
 
 void expect_prefixes(const Bytes& bytes) {
@@ -316,10 +394,10 @@ void expect_prefixes(const Bytes& bytes) {
         for (size_t n = 0; n < bytes.size(); ++n) {
             const Exact part({bytes.data(), n});
             const auto tree = TreeView::open(part.bytes(), options);
-            const uint32_t levels = n == kNodes + kNodeBytes       ? 1
-                                    : n == kNodes + 3 * kNodeBytes ? 2
-                                    : n == kNodes + 6 * kNodeBytes ? 3 // without the triangles
-                                                                   : 0;
+            const uint32_t levels = n == kBlock1   ? 1
+                                    : n == kBlock2 ? 2
+                                    : n == kEnd    ? 3 // without the triangles
+                                                   : 0;
             ASSERT_EQ(tree.has_value(), levels > 0) << n;
             if (!tree) {
                 ASSERT_EQ(tree.error().code, ErrorCode::bad_file) << n;
@@ -381,11 +459,11 @@ TEST(Format, NamesTheFirstOffence) {
         ErrorCode code;
         uint64_t where;
     };
-    const size_t node1 = kNodes + kNodeBytes, node2 = node1 + kNodeBytes, section = kNodes + 6 * kNodeBytes;
+    const size_t counts = kBlock1 + 152, section = kEnd; // counts of nodes 8 and 9
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
-        {8, {1}, ErrorCode::bad_file, 8},
-        {8, {3}, ErrorCode::newer_version, 3},
+        {8, {2}, ErrorCode::bad_file, 8},
+        {8, {4}, ErrorCode::newer_version, 4},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -412,33 +490,52 @@ TEST(Format, NamesTheFirstOffence) {
         {128, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 128},  // infinite diagonal
         {136, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 136},              // negative error
         {140, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 140},              // distance not a number
-        {kTable, {1}, ErrorCode::bad_file, kTable},                       // first node of level 0
+        {kTable, {1}, ErrorCode::bad_file, kTable},                       // first block of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
+        {kTable + kRow + 4, {9}, ErrorCode::bad_file, kTable + kRow + 4}, // more nodes than lanes
         {kTable + 8, {0}, ErrorCode::bad_file, kTable + 8},
-        {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},             // negative union volume
-        {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},             // negative outside ratio
-        {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24}, // infinite distance
-        {kNodes, {2}, ErrorCode::bad_file, kNodes},                          // first child
-        {node1 + 23, {4}, ErrorCode::bad_file, node1 + 23},                  // more children than the degree
-        {node1 + 23, {2}, ErrorCode::bad_file, node1},                       // children that are not the next level
-        {node1 + 22, {101}, ErrorCode::bad_file, node1 + 22},                // exponent
-        {node1 + 10, {0, 0}, ErrorCode::bad_file, node1 + 10},               // no extent
-        {node2 + 23, {128}, ErrorCode::bad_file, node2 + 23},                // a leaf of no triangles
-        {node2 + 23, {129}, ErrorCode::bad_file, node2 + 23},                // triangles in a tree without
+        {kTable + 8, {0x80, 3}, ErrorCode::bad_file, kTable + 8},               // two blocks of roots
+        {kTable + kRow + 8, {0x81, 3}, ErrorCode::bad_file, kTable + kRow + 8}, // no whole number of blocks
+        {kTable + kRow + 8, {0x80, 2}, ErrorCode::bad_file, kTable + kRow + 8}, // no block
+        {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
+        {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
+        {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
+        {kBlocks - 60, {1}, ErrorCode::bad_file, kBlocks - 60},                 // padding
+        {kBlocks - 1, {1}, ErrorCode::bad_file, kBlocks - 1},
+        {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},     // first child
+        {counts, {4}, ErrorCode::bad_file, counts},                   // more children than the degree
+        {counts, {2}, ErrorCode::bad_file, kBlock1},                  // children that are not the next level
+        {kBlock1 + 144, {101}, ErrorCode::bad_file, kBlock1 + 144},   // exponent
+        {kBlock1 + 48, {0, 0}, ErrorCode::bad_file, kBlock1 + 48},    // no extent
+        {kBlock1 + 66, {0, 0}, ErrorCode::bad_file, kBlock1 + 66},    // of the other, along y
+        {kBlock1 + 164, {1}, ErrorCode::bad_file, kBlock1 + 164},     // a leaf's first child
+        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},         // a leaf of no triangles
+        {counts + 1, {129}, ErrorCode::bad_file, counts + 1},         // triangles in a tree without
+        {kBlocks + 2, {1}, ErrorCode::bad_file, kBlocks + 2},         // beside the root: center
+        {kBlocks + 80 + 15, {1}, ErrorCode::bad_file, kBlocks + 95},  // diagonal of the last lane
+        {kBlock1 + 96 + 4, {1}, ErrorCode::bad_file, kBlock1 + 100},  // off-diagonal
+        {kBlock1 + 144 + 2, {1}, ErrorCode::bad_file, kBlock1 + 146}, // exponent
+        {counts + 2, {1}, ErrorCode::bad_file, counts + 2},           // count
+        {kBlock2 + 191, {1}, ErrorCode::bad_file, kBlock2 + 191},     // first
+        {kBlocks + 193, {1}, ErrorCode::bad_file, kBlocks + 193},     // box
+        {kBlock1 + 192, {255}, ErrorCode::bad_file, kBlock1 + 192},   // lower corner above the upper one
+        {kBlocks + 243, {16}, ErrorCode::bad_file, kBlocks + 240},    // box origin
+        {kBlocks + 252, {23}, ErrorCode::bad_file, kBlocks + 252},    // box step
+        {kBlocks + 255, {1}, ErrorCode::bad_file, kBlocks + 255},     // reserved
     };
     const Case exact_cases[] = {
-        {12, {1}, ErrorCode::bad_file, 116},                          // triangle counts of a tree without
-        {116, {0}, ErrorCode::bad_file, 116},                         // no vertices
-        {116, {8}, ErrorCode::bad_file, 16},                          // more than the size says
-        {120, {0}, ErrorCode::bad_file, 120},                         // no triangles
-        {124, {0}, ErrorCode::bad_file, 124},                         // no component
-        {124, {8}, ErrorCode::bad_file, 124},                         // more than vertices
-        {node2 + 23, {0}, ErrorCode::bad_file, node2 + 23},           // a leaf of none
-        {node2 + 23, {128}, ErrorCode::bad_file, node2 + 23},         // another of none
-        {node2 + 23, {130}, ErrorCode::bad_file, node2 + kNodeBytes}, // one that the next leaf has too
-        {section - 1, {130}, ErrorCode::bad_file, 120},               // one more than there are
-        {node1 + 23, {131}, ErrorCode::bad_file, node1},              // an inner node's children as triangles
+        {12, {1}, ErrorCode::bad_file, 116},                     // triangle counts of a tree without
+        {116, {0}, ErrorCode::bad_file, 116},                    // no vertices
+        {116, {8}, ErrorCode::bad_file, 16},                     // more than the size says
+        {120, {0}, ErrorCode::bad_file, 120},                    // no triangles
+        {124, {0}, ErrorCode::bad_file, 124},                    // no component
+        {124, {8}, ErrorCode::bad_file, 124},                    // more than vertices
+        {counts + 1, {0}, ErrorCode::bad_file, counts + 1},      // a leaf of none
+        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},    // another of none
+        {counts + 1, {130}, ErrorCode::bad_file, kBlock2 + 160}, // one that the next leaf has too
+        {kBlock2 + 154, {130}, ErrorCode::bad_file, 120},        // one more than there are
+        {counts, {131}, ErrorCode::bad_file, kBlock1 + 160},     // an inner node's children as triangles
         {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
         {section + 8 + 7 * 12 + 2 * 6 + 4, {7}, ErrorCode::bad_file, section + 8 + 7 * 12 + 12}, // no such vertex
     };
@@ -652,7 +749,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 2); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 3); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

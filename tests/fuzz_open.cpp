@@ -5,7 +5,7 @@
 //   build-fuzz/tests/fuzz_open -max_total_time=60 -max_len=4096 corpus tests/data
 //
 // Hashes are not checked, so that the fuzzer gets past them.
-#include <prolate/query.hpp>
+#include <prolate/collide.hpp>
 #include <prolate/tree.hpp>
 
 #include <cmath>
@@ -49,14 +49,20 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     require(seen >= tree.level_count() && tree.degree() >= 2 && tree.degree() <= kMaxDegree);
     (void)tree.bake_info();
-    for (uint32_t n = 0; n < tree.node_count(); ++n) {
+    const auto holds_node = [&tree](uint32_t slot) { return slot < tree.slot_count() && tree.is_node(slot); };
+    require(holds_node(0) && tree.block(0) + kBlockBytes * tree.block_count() <= bytes.data() + size);
+    uint32_t nodes = 0;
+    tree.for_each_node([&](uint32_t n) {
+        ++nodes;
         check(tree.ellipsoid(n));
         const ChildRange children = tree.children(n);
-        require(children.count == 0 || (children.first > n && children.first + children.count <= tree.node_count()));
+        require(children.count == 0 || children.first > n);
+        for (uint32_t i = 0; i < children.count; ++i) require(holds_node(children.first + i));
         const TriangleRange triangles = tree.triangles(n);
         require((triangles.count > 0) == (tree.has_triangles() && children.count == 0));
         require(uint64_t{triangles.first} + triangles.count <= tree.triangle_count());
-    }
+    });
+    require(nodes == tree.node_count());
     for (uint32_t t = 0; t < tree.triangle_count(); ++t)
         for (const uint32_t corner : tree.triangle(t)) {
             require(corner < tree.vertex_count());
@@ -65,7 +71,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         }
 
     // Poses: the end of the input, as floats of any kind, and tamer ones of the tree's size.
-    CollideContext context;
+    QueryContext context;
     const QueryOptions options{.max_level = data[size - 1] % 40u, .max_pair_tests = 500};
     Pose wild[2];
     std::memcpy(wild, data + size - sizeof wild, sizeof wild);
@@ -77,7 +83,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         const CollideResult ba = collide(tree, b, tree, a, context, options);
         require(ab.verdict == ba.verdict && ab.stats.pair_tests == ba.stats.pair_tests);
         require(ab.stats.pair_tests <= options.max_pair_tests && ab.stats.deepest_level < tree.level_count());
-        require(ab.node_a < tree.node_count() && ab.node_b < tree.node_count());
+        require(holds_node(ab.pair.node_a) && holds_node(ab.pair.node_b));
         // A root never lies apart from itself, unless moved. (Children may lie apart from their parents here.)
         const bool root_only = tree.level_count() == 1 || options.max_level == 0;
         require(!root_only || std::memcmp(&a, &b, sizeof a) != 0 || ab.verdict != Verdict::separated);

@@ -93,10 +93,10 @@ TEST(Render, SilhouetteIsTheEllipsoids) {
         std::vector<Ellipsoid> ellipsoids;
         std::vector<uint32_t> nodes;
         Box box;
-        for (uint32_t node = 1; node < tree.view().node_count(); ++node) {
+        tree.view().for_each_node(1, [&](uint32_t node) {
             nodes.push_back(node);
             box.add(ellipsoids.emplace_back(tree.view().ellipsoid(node)));
-        }
+        });
         const Frame frame = box.frame();
         const Scene scene(tree.view(), nodes, frame);
         for (const View& view : {View{30, 18, UpAxis::y}, View{-100, -40, UpAxis::z}, View{200, 70, UpAxis::minus_x}}) {
@@ -177,11 +177,11 @@ TEST(Render, DescendantsKeepTheHue) {
         const Tree tree = nested_circles(degree, 4);
         const TreeView view = tree.view();
         const auto colours = node_colours(view);
-        ASSERT_EQ(colours.size(), view.node_count());
+        ASSERT_EQ(colours.size(), view.slot_count());
         EXPECT_LT(colours[0].chroma, 0.01); // the root is grey
         // The node of level 1 that each node descends from, by its own walk down the tree.
-        std::vector<uint32_t> branch(view.node_count());
-        for (uint32_t node = 0; node < view.node_count(); ++node) {
+        std::vector<uint32_t> branch(view.slot_count());
+        view.for_each_node([&](uint32_t node) {
             const ChildRange range = view.children(node);
             for (uint32_t child = range.first; child < range.first + range.count; ++child)
                 branch[child] = node == 0 ? child : branch[node];
@@ -189,14 +189,15 @@ TEST(Render, DescendantsKeepTheHue) {
             if (node != 0 && range.count > 1) {
                 EXPECT_GT(std::abs(colours[range.first].lightness - colours[range.first + 1].lightness), 0.02);
             }
-        }
-        for (uint32_t node = 1; node < view.node_count(); ++node) {
+        });
+        view.for_each_node([&](uint32_t node) {
+            if (node == 0) return;
             const Oklch c = to_oklch(to_linear_rgb(colours[node]));
             const Oklch top = to_oklch(to_linear_rgb(colours[branch[node]]));
             EXPECT_LT(hue_difference(c.hue, top.hue), 0.01) << "node " << node << " below " << branch[node];
             EXPECT_NEAR(c.lightness, top.lightness, 0.1);
             EXPECT_GT(c.chroma, 0.03);
-        }
+        });
     }
 }
 

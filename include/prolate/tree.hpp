@@ -4,6 +4,10 @@
 // together cover the part of the solid that the node stands for. A *cut* takes the nodes of one level, plus the leaves
 // above it; every cut covers the solid. A child need not lie inside its parent's ellipsoid.
 //
+// Nodes are stored in *blocks* of eight siblings, as the runtime tests them: one node against eight at once. A node's
+// index is its *slot*, 8 * block + lane. The children of a node fill the lanes of blocks of their own from the first
+// on; lanes that are left over hold no node, so slots are not consecutive from family to family: is_node() tells.
+//
 // An *exact* tree also holds the triangles of its mesh, a few in each leaf. Its ellipsoids cover these triangles, not
 // what they enclose, and only cull; queries answer as the triangles do.
 //
@@ -24,7 +28,8 @@ namespace prolate {
 
 inline constexpr uint32_t kMaxDegree = 64; ///< children per node, at most
 inline constexpr uint32_t kMaxLevels = 32; ///< levels including the root, at most
-inline constexpr size_t kNodeBytes = 24;   ///< bytes of one node in the file
+inline constexpr uint32_t kBlockLanes = 8; ///< nodes that a block has room for
+inline constexpr size_t kBlockBytes = 256; ///< bytes of one block in the file
 
 /// Triangles in a leaf of an exact tree, at most.
 inline constexpr uint32_t kMaxLeafTriangles = 127;
@@ -83,12 +88,19 @@ struct LevelFigures {
 
 /// One level of the tree.
 struct LevelInfo : LevelFigures {
-    uint32_t first_node = 0; ///< index of its first node
-    uint32_t node_count = 0; ///< nodes of this level
-    uint64_t end_byte = 0;   ///< the file's first end_byte bytes are a valid tree that ends with this level
+    uint32_t first_slot = 0;  ///< of its first node: slots first_slot ... first_slot + kBlockLanes * block_count - 1
+    uint32_t block_count = 0; ///< blocks of this level
+    uint32_t node_count = 0;  ///< nodes of this level
+    uint64_t end_byte = 0;    ///< the file's first end_byte bytes are a valid tree that ends with this level
 };
 
-/// Children of a node: indices first ... first + count - 1. A leaf has count 0.
+/// The lattice that the nodes' centers lie on: center_i = (origin_i + q_i) * 2^step_exponent metres, q_i as stored.
+struct LatticeInfo {
+    int32_t origin[3] = {};    ///< |origin_i + q_i| < 2^24: an integer that a float holds exactly
+    int32_t step_exponent = 0; ///< -120 ... 60
+};
+
+/// Children of a node: slots first ... first + count - 1, all of them nodes. A leaf has count 0.
 struct ChildRange {
     uint32_t first = 0;
     uint32_t count = 0;
@@ -116,6 +128,11 @@ public:
     static Result<TreeView> open(std::span<const std::byte> bytes, const OpenOptions& options = {}) noexcept;
 
     uint32_t node_count() const noexcept { return node_count_; }
+    uint32_t block_count() const noexcept { return block_count_; }
+    /// Slots of nodes lie below this: kBlockLanes * block_count(). The root's is 0.
+    uint32_t slot_count() const noexcept { return kBlockLanes * block_count_; }
+    /// Does `slot` < slot_count() hold a node?
+    bool is_node(uint32_t slot) const noexcept;
     /// Levels present, the root included: at least 1, at most kMaxLevels.
     uint32_t level_count() const noexcept { return level_count_; }
     /// True if the bytes are a prefix of a longer file.
@@ -124,12 +141,22 @@ public:
     uint32_t degree() const noexcept;
     /// `l` < level_count().
     LevelInfo level(uint32_t l) const noexcept;
+    /// First slot of level `l` < level_count().
+    uint32_t first_slot(uint32_t l) const noexcept;
     BakeInfo bake_info() const noexcept;
+    /// BakeInfo::surface_mode
+    bool surface_mode() const noexcept;
     std::span<const std::byte> bytes() const noexcept { return bytes_; }
+    LatticeInfo lattice() const noexcept { return lattice_; }
+    /// The kBlockBytes bytes of block `b` < block_count(), a structure of arrays (src/FORMAT.md): nodes b * kBlockLanes
+    /// and following. Aligned to 64 bytes if the tree's bytes are. In a prefix, the last level's nodes may still count
+    /// children, which are not there: children() knows.
+    const std::byte* block(uint32_t b) const noexcept { return blocks_ + size_t{b} * kBlockBytes; }
 
-    /// The ellipsoid of `node` < node_count(), exactly as stored: every float is an integer times a power of two.
+    /// The ellipsoid of `node`, exactly as stored: every float is an integer times a power of two. Here and below, a
+    /// node is a slot for which is_node() holds.
     Ellipsoid ellipsoid(uint32_t node) const noexcept;
-    /// The children of `node` < node_count(); none for a leaf, and none for the last level of a prefix.
+    /// The children of `node`; none for a leaf, and none for the last level of a prefix.
     ChildRange children(uint32_t node) const noexcept;
     bool is_leaf(uint32_t node) const noexcept { return children(node).count == 0; }
 
@@ -141,27 +168,43 @@ public:
     /// Vertices 0 ... component_count() - 1 are one of each part of the surface that hangs together: what a point-in-
     /// solid test needs to tell whether one solid holds a part of another whose surface it does not meet.
     uint32_t component_count() const noexcept { return component_count_; }
-    /// Triangles of `node` < node_count(); none for an inner node.
+    /// Triangles of `node`; none for an inner node.
     TriangleRange triangles(uint32_t node) const noexcept;
     /// Vertex indices of triangle `t` < triangle_count(), in the mesh's order: counter-clockwise seen from outside.
     Triangle triangle(uint32_t t) const noexcept;
     /// Position of vertex `v` < vertex_count(), the mesh's own float coordinates, metres.
     Vec3 vertex(uint32_t v) const noexcept;
+    /// The bytes of all vertices, three floats each, and of all triangles, three vertex indices each, of two bytes if
+    /// vertex_count() <= 65536, else of four; little-endian, without alignment (src/FORMAT.md).
+    const std::byte* vertex_bytes() const noexcept { return vertices_; }
+    const std::byte* triangle_bytes() const noexcept { return triangles_; }
 
+    /// Calls visit(node) for each node of level `l`, in order of slots.
+    template <class Visit> void for_each_node(uint32_t l, Visit&& visit) const {
+        const LevelInfo at = level(l);
+        for_each_node_in(at.first_slot, at.first_slot + kBlockLanes * at.block_count, visit);
+    }
+    /// Calls visit(node) for each node, in order of slots: parents before their children.
+    template <class Visit> void for_each_node(Visit&& visit) const { for_each_node_in(0, slot_count(), visit); }
     /// Calls visit(node) for each node of the cut at `l`: the nodes of that level and the leaves above it.
     template <class Visit> void for_each_in_cut(uint32_t l, Visit&& visit) const {
-        const LevelInfo last = level(l);
-        for (uint32_t node = 0; node < last.first_node + last.node_count; ++node)
-            if (node >= last.first_node || is_leaf(node)) visit(node);
+        for_each_node_in(0, level(l).first_slot, [&](uint32_t node) {
+            if (is_leaf(node)) visit(node);
+        });
+        for_each_node(l, visit);
     }
 
 private:
     TreeView() = default;
+    template <class Visit> void for_each_node_in(uint32_t begin, uint32_t end, Visit&& visit) const {
+        for (uint32_t slot = begin; slot < end; ++slot)
+            if (is_node(slot)) visit(slot);
+    }
     std::span<const std::byte> bytes_;
-    const std::byte* nodes_ = nullptr;
-    int32_t origin_[3] = {};
-    int32_t step_exponent_ = 0;
+    const std::byte* blocks_ = nullptr;
+    LatticeInfo lattice_;
     uint32_t node_count_ = 0;
+    uint32_t block_count_ = 0;
     uint32_t level_count_ = 0;
     bool is_prefix_ = false;
     const std::byte* vertices_ = nullptr;  // null without triangles

@@ -1,0 +1,107 @@
+// Offsets of an .etree file's header, levels table and triangle section (src/FORMAT.md); those of its blocks are in
+// block.hpp. Changing any of them is a new format version: add a row to FORMAT.md's history.
+#pragma once
+
+#include "src/block.hpp"
+#include "src/hash.hpp"
+
+#include <prolate/tree.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <span>
+
+namespace prolate {
+
+inline constexpr unsigned char kMagic[8] = {0x89, 'E', 'T', 'R', 'E', 'E', '\r', '\n'};
+
+enum HeaderOffset : size_t {
+    kAtMagic = 0,
+    kAtVersion = 8,
+    kAtHeaderSize = 10,
+    kAtFlags = 12,
+    kAtTotalSize = 16,
+    kAtHeaderHash = 24,
+    kAtSourceHash = 32,
+    kAtOptionsHash = 40,
+    kAtNodeCount = 48,
+    kAtLevelCount = 52,
+    kAtDegree = 54,
+    kAtOrigin = 56,
+    kAtStepExponent = 68,
+    kAtReserved0 = 70,
+    kAtSolidVolume = 72,
+    kAtMethod = 80,
+    kAtPrimitive = 81,
+    kAtQuality = 82,
+    kAtReserved1 = 83,
+    kAtAlpha = 84,
+    kAtBeta = 88,
+    kAtTolerance = 92,
+    kAtLevels = 96,
+    kAtEllipsoids = 100,
+    kAtSeed = 104,
+    kAtResolution = 112,
+    kAtVertexCount = 116,
+    kAtTriangleCount = 120,
+    kAtComponentCount = 124,
+    kAtDiagonal = 128,
+    kAtSolidVolumeError = 136,
+    kAtDistance = 140,
+    kHeaderBytes = 144,
+};
+enum Flag : uint32_t { kSurfaceMode = 1, kExact = 2, kProved = 4, kGoalMissed = 8, kAllFlags = 15 };
+
+// A row of the levels table, which follows the header.
+enum LevelOffset : size_t {
+    kLevelFirstBlock = 0,
+    kLevelNodeCount = 4,
+    kLevelEndByte = 8,
+    kLevelHash = 16,
+    kLevelUnionVolume = 24,
+    kLevelFigures = 32, // kFigures, in their order
+    kLevelBytes = 60,
+};
+inline constexpr double LevelFigures::*kFigures[] = {
+    &LevelFigures::outside_ratio, &LevelFigures::outside_ratio_error, &LevelFigures::sum_outside_ratio,
+    &LevelFigures::surface_error, &LevelFigures::hausdorff_max,       &LevelFigures::hausdorff_mean,
+    &LevelFigures::hausdorff_p99,
+};
+static_assert(kLevelFigures + sizeof(float) * std::size(kFigures) == kLevelBytes);
+
+// The blocks follow the levels table, from the next multiple of their alignment on; zeros fill the gap.
+constexpr size_t table_end(uint32_t level_count) {
+    return kHeaderBytes + level_count * kLevelBytes;
+}
+constexpr size_t blocks_begin(uint32_t level_count) {
+    return (table_end(level_count) + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
+}
+
+// Slots are 32 bits wide.
+inline constexpr uint64_t kMaxBlocks = UINT32_MAX / kBlockLanes;
+
+// In 64-bit arithmetic, also for a reader whose size_t has 32.
+constexpr uint64_t end_of_blocks(uint32_t level_count, uint64_t blocks) {
+    return blocks_begin(level_count) + blocks * kBlockBytes;
+}
+
+// The triangle section of an exact tree, which follows the blocks: hash, vertices, indices.
+inline constexpr size_t kSectionHashBytes = 8, kVertexBytes = 12;
+
+// Bytes of a vertex index.
+constexpr size_t index_bytes(uint32_t vertex_count) {
+    return vertex_count <= 0x10000 ? 2 : 4;
+}
+
+constexpr uint64_t section_bytes(uint32_t vertices, uint32_t triangles) {
+    return kSectionHashBytes + uint64_t{vertices} * kVertexBytes + uint64_t{triangles} * 3 * index_bytes(vertices);
+}
+
+// Hash of header and levels table without the hash field itself.
+inline uint64_t header_hash(std::span<const std::byte> header_and_table) {
+    const uint64_t before = hash_bytes(header_and_table.first(kAtHeaderHash));
+    return hash_bytes(header_and_table.subspan(kAtHeaderHash + 8), before);
+}
+
+} // namespace prolate

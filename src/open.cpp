@@ -1,0 +1,321 @@
+// Validating .etree bytes (src/FORMAT.md, "What open() checks").
+//
+// Validation makes every later query memory-safe and finite. It does not, and cannot, prove that the nodes cover
+// anything: the content hashes find accidents, verify() proves cover against a mesh.
+//
+// Complexity: linear in the bytes.
+#include <prolate/tree.hpp>
+
+#include "src/bytes.hpp"
+#include "src/format.hpp"
+#include "src/hash.hpp"
+#include "src/layout.hpp"
+
+#include <prolate/version.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace prolate {
+namespace {
+
+Error bad(const char* what, uint64_t where) {
+    return {ErrorCode::bad_file, what, where};
+}
+
+// Offset of the first byte of from[begin ... end - 1] that is not zero, or `end`.
+size_t first_nonzero(const std::byte* from, size_t begin, size_t end) {
+    while (begin < end && from[begin] == std::byte{0}) ++begin;
+    return begin;
+}
+bool all_zero(const std::byte* from, size_t count) {
+    return first_nonzero(from, 0, count) == count;
+}
+
+// A figure that is unknown (NaN) or finite and not negative.
+template <class T> bool is_metric(T value) {
+    return std::isnan(value) || (std::isfinite(value) && value >= 0);
+}
+
+// The header on its own: everything that does not need the nodes.
+Result<void> check_header(std::span<const std::byte> bytes) {
+    const std::byte* h = bytes.data();
+    if (bytes.empty()) return bad("the file is empty", 0);
+    if (bytes.size() < sizeof kMagic || std::memcmp(h, kMagic, sizeof kMagic) != 0)
+        return bad("not an .etree file (wrong magic number)", kAtMagic);
+    if (bytes.size() < kAtVersion + 2) return bad("the file ends inside its header", bytes.size());
+    const uint16_t version = load_le<uint16_t>(h + kAtVersion);
+    if (version > kFormatVersion)
+        return Error{ErrorCode::newer_version, "written by a newer format version than this library reads", version};
+    if (version == 0) return bad("unknown format version", kAtVersion);
+    if (version < kFormatVersion) return bad("written by an older format version than this library reads", kAtVersion);
+    if (bytes.size() < kHeaderBytes) return bad("the file ends inside its header", bytes.size());
+    if (load_le<uint16_t>(h + kAtHeaderSize) != kHeaderBytes) return bad("wrong header size", kAtHeaderSize);
+    const uint32_t flags = load_le<uint32_t>(h + kAtFlags);
+    if ((flags & ~uint32_t{kAllFlags}) != 0) return bad("unknown flag", kAtFlags);
+    const uint32_t levels = load_le<uint16_t>(h + kAtLevelCount);
+    if (levels < 1 || levels > kMaxLevels) return bad("level count out of range", kAtLevelCount);
+    const uint32_t degree = load_le<uint16_t>(h + kAtDegree);
+    if (degree < 2 || degree > kMaxDegree) return bad("degree out of range", kAtDegree);
+    for (size_t i = 0; i < 3; ++i) {
+        const int32_t origin = load_le<int32_t>(h + kAtOrigin + 4 * i);
+        if (origin <= -format::kMaxCoordinate || origin >= format::kMaxCoordinate - UINT16_MAX)
+            return bad("lattice origin out of range", kAtOrigin + 4 * i);
+    }
+    const int32_t step = load_le<int16_t>(h + kAtStepExponent);
+    if (step < format::kMinStepExponent || step > format::kMaxStepExponent)
+        return bad("lattice step out of range", kAtStepExponent);
+    if (!is_metric(load_le<double>(h + kAtSolidVolume))) return bad("solid volume out of range", kAtSolidVolume);
+    if (load_le<uint8_t>(h + kAtMethod) > static_cast<uint8_t>(Method::analytic))
+        return bad("unknown method", kAtMethod);
+    if (load_le<uint8_t>(h + kAtPrimitive) > static_cast<uint8_t>(Primitive::sphere))
+        return bad("unknown primitive", kAtPrimitive);
+    if (load_le<uint8_t>(h + kAtQuality) > static_cast<uint8_t>(Quality::best))
+        return bad("unknown quality", kAtQuality);
+    for (const size_t at : {kAtAlpha, kAtBeta, kAtTolerance, kAtDistance})
+        if (!std::isfinite(load_le<float>(h + at)) || load_le<float>(h + at) < 0) return bad("option out of range", at);
+    if (!all_zero(h + kAtReserved0, 2)) return bad("reserved bytes are not zero", kAtReserved0);
+    if (!all_zero(h + kAtReserved1, 1)) return bad("reserved bytes are not zero", kAtReserved1);
+    if (!is_metric(load_le<double>(h + kAtDiagonal))) return bad("diagonal out of range", kAtDiagonal);
+    if (!is_metric(load_le<float>(h + kAtSolidVolumeError)))
+        return bad("solid volume error out of range", kAtSolidVolumeError);
+    if (!(flags & kExact)) {
+        if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
+            return bad("triangle counts of a tree without triangles", kAtVertexCount);
+        return {};
+    }
+    const uint32_t vertices = load_le<uint32_t>(h + kAtVertexCount);
+    if (vertices == 0) return bad("an exact tree without vertices", kAtVertexCount);
+    if (load_le<uint32_t>(h + kAtTriangleCount) == 0) return bad("an exact tree without triangles", kAtTriangleCount);
+    const uint32_t components = load_le<uint32_t>(h + kAtComponentCount);
+    if (components == 0 || components > vertices) return bad("component count out of range", kAtComponentCount);
+    return {};
+}
+
+// What the levels table says.
+struct Levels {
+    uint64_t nodes = 0, blocks = 0; // of the whole file
+    uint32_t present = 0;           // levels that the bytes hold
+};
+
+// The table: consecutive levels of whole blocks, and no block without a node.
+Result<Levels> check_levels(std::span<const std::byte> bytes, uint32_t level_count) {
+    const std::byte* const h = bytes.data();
+    Levels out;
+    auto& [nodes, blocks, present] = out;
+    for (uint32_t l = 0; l < level_count; ++l) {
+        const size_t at = kHeaderBytes + l * kLevelBytes;
+        if (load_le<uint32_t>(h + at + kLevelFirstBlock) != blocks) return bad("levels are not consecutive", at);
+        const uint64_t begin = end_of_blocks(level_count, blocks), end = load_le<uint64_t>(h + at + kLevelEndByte);
+        const uint64_t more = end > begin ? (end - begin) / kBlockBytes : 0;
+        if (more == 0 || more > kMaxBlocks - blocks || end != begin + more * kBlockBytes || (l == 0 && more != 1))
+            return bad("wrong byte count of a level", at + kLevelEndByte);
+        const uint32_t count = load_le<uint32_t>(h + at + kLevelNodeCount);
+        if (count < more || count > kBlockLanes * more || (l == 0 && count != 1))
+            return bad("wrong node count of a level", at + kLevelNodeCount);
+        nodes += count;
+        blocks += more;
+        bool sound = is_metric(load_le<double>(h + at + kLevelUnionVolume));
+        for (size_t i = kLevelFigures; i < kLevelBytes; i += sizeof(float))
+            sound = sound && is_metric(load_le<float>(h + at + i));
+        if (!sound) return bad("level figures out of range", at + kLevelUnionVolume);
+        if (end <= bytes.size()) present = l + 1;
+    }
+    return out;
+}
+
+// Checks the nodes level by level: each has its fields in range, siblings fill the lanes of their blocks from the first
+// on, the rest is empty, and children and triangles follow each other in breadth-first order. So each node but the root
+// has one parent, before it, and each triangle one leaf.
+class NodeCheck {
+public:
+    NodeCheck(const std::byte* file, size_t first_block, uint32_t degree, bool exact)
+        : file_(file), first_block_(first_block), degree_(degree), exact_(exact) {}
+
+    // The next level's blocks begin at block `end` of the tree.
+    void begin_level(uint32_t end) { children_ = 0, level_end_ = next_child_block_ = end; }
+
+    // The next `count` siblings, in blocks that the caller has found to be there.
+    Result<void> family(uint32_t count) {
+        for (uint32_t i = 0; i < count; ++i)
+            if (const auto sound = node(at(block_ + i / kBlockLanes), i % kBlockLanes); !sound) return sound;
+        for (uint32_t i = 0; i < blocks_for(count); ++i)
+            if (const auto sound = box_frame(at(block_ + i)); !sound) return sound;
+        block_ += blocks_for(count);
+        if (count % kBlockLanes == 0) return {};
+        return no_nodes_from(at(block_ - 1), count % kBlockLanes);
+    }
+
+    uint32_t child_count(uint32_t slot) const {
+        const auto count = load_le<uint8_t>(file_ + at(slot / kBlockLanes) + kBlockCount + slot % kBlockLanes);
+        return count & kTriangleLeaf ? 0 : count;
+    }
+
+    uint64_t children() const { return children_; } // of the level's nodes so far, and the blocks that they take
+    uint64_t child_blocks() const { return next_child_block_ - level_end_; }
+    uint64_t triangles() const { return next_triangle_; } // of all nodes so far
+
+private:
+    size_t at(uint32_t block) const { return first_block_ + size_t{block} * kBlockBytes; }
+
+    Result<void> node(size_t block, size_t lane) {
+        const std::byte* const from = file_ + block;
+        const size_t at_count = kBlockCount + lane, at_first = kBlockFirst + 4 * lane, at_size = kBlockExponent + lane;
+        const uint32_t count = load_le<uint8_t>(from + at_count);
+        const bool has_triangles = (count & kTriangleLeaf) != 0;
+        const uint32_t children = has_triangles ? 0 : count, triangles = has_triangles ? count - kTriangleLeaf : 0;
+        if (children > degree_) return bad("a node has more children than the degree", block + at_count);
+        if (has_triangles != (exact_ && children == 0) || has_triangles != (triangles > 0))
+            return bad("a leaf has no triangles, or some in a tree without", block + at_count);
+        const uint64_t first = children ? kBlockLanes * next_child_block_ : triangles ? next_triangle_ : 0;
+        if (load_le<uint32_t>(from + at_first) != first)
+            return bad("children or triangles are not in breadth-first order", block + at_first);
+        children_ += children;
+        next_child_block_ += blocks_for(children);
+        next_triangle_ += triangles;
+        const int exponent = load_le<int8_t>(from + at_size);
+        if (exponent < format::kMinNodeExponent || exponent > format::kMaxNodeExponent)
+            return bad("node size out of range", block + at_size);
+        for (size_t i = 0; i < 3; ++i)
+            if (const size_t here = block_offset(kBlockDiagonal, i, lane); load_le<uint16_t>(from + here) == 0)
+                return bad("a node has no extent", block + here);
+        for (size_t i = 0; i < 3; ++i) {
+            const size_t low = kBlockBoxLow + kBlockLanes * i + lane, high = kBlockBoxHigh + kBlockLanes * i + lane;
+            if (load_le<uint8_t>(from + low) > load_le<uint8_t>(from + high)) return bad("a box is empty", block + low);
+        }
+        return {};
+    }
+
+    Result<void> box_frame(size_t block) {
+        const std::byte* const from = file_ + block;
+        for (size_t i = 0; i < 3; ++i) {
+            const int32_t origin = load_le<int32_t>(from + kBlockBoxOrigin + 4 * i);
+            if (origin <= -kMaxBoxOrigin || origin >= kMaxBoxOrigin)
+                return bad("box origin out of range", block + kBlockBoxOrigin + 4 * i);
+            if (load_le<uint8_t>(from + kBlockBoxExponent + i) > kMaxBoxExponent)
+                return bad("box step out of range", block + kBlockBoxExponent + i);
+        }
+        if (from[kBlockReserved] != std::byte{0}) return bad("reserved bytes are not zero", block + kBlockReserved);
+        return {};
+    }
+
+    // The lanes of `block` from `lane` on are empty.
+    Result<void> no_nodes_from(size_t block, size_t lane) const {
+        struct Row { // eight numbers of one kind
+            size_t begin, width;
+        };
+        Row rows[18] = {{kBlockExponent, 1}, {kBlockCount, 1}, {kBlockFirst, 4}};
+        size_t count = 3;
+        for (const size_t array : {kBlockBoxLow, kBlockBoxHigh})
+            for (size_t i = 0; i < 3; ++i) rows[count++] = {array + kBlockLanes * i, 1};
+        for (const size_t array : {kBlockCenter, kBlockDiagonal, kBlockOffDiagonal})
+            for (size_t i = 0; i < 3; ++i) rows[count++] = {block_offset(array, i, 0), 2};
+        for (const auto [begin, width] : rows) {
+            const size_t end = block + begin + kBlockLanes * width;
+            const size_t found = first_nonzero(file_, block + begin + lane * width, end);
+            if (found < end) return bad("a lane without a node is not zero", found);
+        }
+        return {};
+    }
+
+    const std::byte* const file_;
+    const size_t first_block_;
+    const uint32_t degree_;
+    const bool exact_;
+    uint32_t block_ = 0; // of the next family
+    uint64_t level_end_ = 0, next_child_block_ = 0;
+    uint64_t children_ = 0, next_triangle_ = 0;
+};
+
+} // namespace
+
+Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOptions& options) noexcept {
+    if (const auto header = check_header(bytes); !header) return header.error();
+    const std::byte* const h = bytes.data();
+    const uint32_t level_count = load_le<uint16_t>(h + kAtLevelCount);
+    const size_t table_bytes = table_end(level_count);
+    if (bytes.size() < table_bytes) return bad("the file ends inside its levels table", bytes.size());
+    if (options.check_hash && header_hash(bytes.first(table_bytes)) != load_le<uint64_t>(h + kAtHeaderHash))
+        return bad("the header is damaged (hash mismatch)", kAtHeaderHash);
+
+    const auto levels = check_levels(bytes, level_count);
+    if (!levels) return levels.error();
+    const auto [nodes, blocks, present] = *levels;
+    if (load_le<uint32_t>(h + kAtNodeCount) != nodes) return bad("wrong node count", kAtNodeCount);
+    const bool exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0;
+    const uint32_t vertex_count = load_le<uint32_t>(h + kAtVertexCount);
+    const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
+    const uint64_t total =
+        end_of_blocks(level_count, blocks) + (exact ? section_bytes(vertex_count, triangle_count) : 0);
+    if (load_le<uint64_t>(h + kAtTotalSize) != total) return bad("wrong total size", kAtTotalSize);
+    if (present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
+    const uint64_t present_end = load_le<uint64_t>(h + kHeaderBytes + (present - 1) * kLevelBytes + kLevelEndByte);
+    if (bytes.size() > total) return bad("bytes follow the end of the tree", total);
+    if (bytes.size() != total && bytes.size() != present_end)
+        return present == level_count ? bad("the file is cut off inside its triangles", bytes.size())
+                                      : bad("the file is cut off inside a level", bytes.size());
+
+    const size_t first_block = blocks_begin(level_count);
+    if (const size_t at = first_nonzero(h, table_bytes, first_block); at < first_block)
+        return bad("bytes between the levels table and the nodes are not zero", at);
+
+    TreeView view;
+    view.bytes_ = bytes;
+    view.blocks_ = h + first_block;
+    view.level_count_ = level_count; // for a look beyond the bytes, at the table
+    view.is_prefix_ = bytes.size() < total;
+    for (size_t i = 0; i < 3; ++i) view.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
+    view.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
+    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact);
+    for (uint32_t l = 0; l < present; ++l) {
+        const LevelInfo level = view.level(l);
+        view.node_count_ += level.node_count;
+        view.block_count_ += level.block_count;
+        const size_t begin = level.end_byte - level.block_count * kBlockBytes;
+        if (options.check_hash && hash_bytes(bytes.subspan(begin, level.end_byte - begin)) !=
+                                      load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
+            return bad("the nodes of a level are damaged (hash mismatch)", begin);
+        check.begin_level(view.block_count_);
+        if (l == 0) {
+            if (const auto sound = check.family(1); !sound) return sound.error();
+        } else {
+            const LevelInfo above = view.level(l - 1);
+            for (uint32_t i = 0; i < kBlockLanes * above.block_count; ++i) {
+                const uint32_t children = check.child_count(above.first_slot + i); // none of a lane without a node
+                if (children == 0) continue;
+                if (const auto sound = check.family(children); !sound) return sound.error();
+            }
+        }
+        const LevelInfo below = l + 1 < level_count ? view.level(l + 1) : LevelInfo{};
+        if (check.children() != below.node_count || check.child_blocks() != below.block_count)
+            return bad("the children of a level are not the next level", begin);
+    }
+    view.level_count_ = present;
+    const uint64_t next_triangle = check.triangles();
+    if (next_triangle > triangle_count || (present == level_count && next_triangle != triangle_count))
+        return bad("the leaves do not share out the triangles", kAtTriangleCount);
+    if (!exact || view.is_prefix_) return view;
+
+    const size_t section = present_end, vertices = section + kSectionHashBytes;
+    if (options.check_hash && hash_bytes(bytes.subspan(vertices)) != load_le<uint64_t>(h + section))
+        return bad("the triangles are damaged (hash mismatch)", section);
+    view.vertices_ = h + vertices;
+    view.triangles_ = view.vertices_ + size_t{vertex_count} * kVertexBytes;
+    view.vertex_count_ = vertex_count;
+    view.triangle_count_ = triangle_count;
+    view.component_count_ = load_le<uint32_t>(h + kAtComponentCount);
+    for (uint32_t v = 0; v < vertex_count; ++v) {
+        const Vec3 p = view.vertex(v);
+        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+            return bad("a vertex is not finite", vertices + size_t{v} * kVertexBytes);
+    }
+    for (uint32_t t = 0; t < triangle_count; ++t)
+        for (const uint32_t corner : view.triangle(t))
+            if (corner >= vertex_count)
+                return bad("a triangle names a vertex that does not exist",
+                           static_cast<size_t>(view.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count));
+    return view;
+}
+
+} // namespace prolate

@@ -1,0 +1,107 @@
+// Numbers of a node: from doubles to the integers of the file, and from these to floats, exactly (format.hpp).
+#include "src/format.hpp"
+
+#include "src/block.hpp"
+#include "src/bytes.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+namespace prolate::format {
+
+Lattice lattice_for(const double low[3], const double high[3]) noexcept {
+    double extent = 0, reach = 0;
+    for (int i = 0; i < 3; ++i) {
+        extent = std::max(extent, high[i] - low[i]);
+        reach = std::max({reach, std::abs(low[i]), std::abs(high[i])});
+    }
+    // The smallest step for which the box spans fewer than 2^16 - 2 steps and lies within 2^24 - 2^17 steps of zero.
+    const double needed = std::max(extent / (UINT16_MAX - 2.0), reach / (kMaxCoordinate - 2.0 * UINT16_MAX));
+    int exponent = kMinStepExponent;
+    if (needed > 0) exponent = std::clamp(std::ilogb(needed) + 1, kMinStepExponent, kMaxStepExponent);
+    Lattice lattice;
+    lattice.step_exponent = exponent;
+    for (int i = 0; i < 3; ++i) // the clamp acts only beyond the coarsest step, where nothing fits anyway
+        lattice.origin[i] = static_cast<int32_t>(std::clamp(std::floor(std::ldexp(low[i], -exponent)),
+                                                            1.0 - kMaxCoordinate, kMaxCoordinate - UINT16_MAX - 1.0));
+    return lattice;
+}
+
+void quantise(PackedNode& node, const Lattice& lattice, const double center[3], const double factor[6]) noexcept {
+    for (size_t i = 0; i < 3; ++i) {
+        const double q = std::nearbyint(std::ldexp(center[i], -lattice.step_exponent)) - lattice.origin[i];
+        node.center[i] = static_cast<uint16_t>(std::clamp(q, 0.0, double{UINT16_MAX}));
+    }
+    const double diagonal[3] = {factor[0], factor[2], factor[5]};
+    const double off[3] = {factor[1], factor[3], factor[4]};
+    double largest = 0;
+    for (int i = 0; i < 3; ++i) largest = std::max({largest, diagonal[i], std::abs(off[i])});
+    // The smallest exponent at which the largest entry fits after rounding.
+    int exponent =
+        std::clamp(largest > 0 ? std::ilogb(largest) + 1 : kMinNodeExponent, kMinNodeExponent, kMaxNodeExponent);
+    if (std::ldexp(largest, 16 - exponent) > UINT16_MAX - 1.0 && exponent < kMaxNodeExponent) ++exponent;
+    node.exponent = static_cast<int8_t>(exponent);
+    for (size_t i = 0; i < 3; ++i) {
+        node.diagonal[i] = static_cast<uint16_t>(
+            std::clamp(std::nearbyint(std::ldexp(diagonal[i], 16 - exponent)), 1.0, double{UINT16_MAX}));
+        node.off_diagonal[i] = static_cast<int16_t>(
+            std::clamp(std::nearbyint(std::ldexp(off[i], 15 - exponent)), double{INT16_MIN}, double{INT16_MAX}));
+    }
+}
+
+void store_boxes(std::byte* block, std::span<const PackedNode> siblings, const Lattice& lattice) noexcept {
+    assert(siblings.size() <= kBlockLanes);
+    constexpr double kSlack = 0x1p-16;             // far above the rounding of a lattice coordinate
+    constexpr double kLargest = kMaxBoxOrigin - 1; // keeps the numbers in range, whatever the node
+    double low[kBlockLanes][3], high[kBlockLanes][3];
+    for (size_t lane = 0; lane < siblings.size(); ++lane) {
+        const PackedNode& node = siblings[lane];
+        const Ellipsoid e = decode(node, lattice);
+        const double center[3] = {e.center.x, e.center.y, e.center.z};
+        const double half[3] = {e.l11, std::hypot(e.l21, e.l22), std::hypot(e.l31, e.l32, e.l33)};
+        for (size_t i = 0; i < 3; ++i) {
+            const bool given = node.box_low[i] <= node.box_high[i];
+            const double from = given ? node.box_low[i] : center[i] - half[i] * (1 + 0x1p-40);
+            const double to = given ? node.box_high[i] : center[i] + half[i] * (1 + 0x1p-40);
+            const auto steps = [&](double x) { return std::ldexp(x, -lattice.step_exponent) - lattice.origin[i]; };
+            low[lane][i] = std::max(std::floor(steps(from) - kSlack), -kLargest);
+            high[lane][i] = std::min(std::ceil(steps(to) + kSlack), kLargest);
+        }
+    }
+    for (size_t i = 0; i < 3; ++i) {
+        double first = kLargest, last = -kLargest;
+        for (size_t lane = 0; lane < siblings.size(); ++lane)
+            first = std::min(first, low[lane][i]), last = std::max(last, high[lane][i]);
+        uint8_t exponent = 0;
+        while (std::ceil(std::ldexp(last - first, -exponent)) > UINT8_MAX) ++exponent;
+        store_le(block + kBlockBoxOrigin + 4 * i, static_cast<int32_t>(first));
+        store_le(block + kBlockBoxExponent + i, exponent);
+        for (size_t lane = 0; lane < siblings.size(); ++lane) {
+            const auto store = [&](size_t array, double x) {
+                store_le(block + array + kBlockLanes * i + lane, static_cast<uint8_t>(x));
+            };
+            store(kBlockBoxLow, std::floor(std::ldexp(low[lane][i] - first, -exponent)));
+            store(kBlockBoxHigh, std::ceil(std::ldexp(high[lane][i] - first, -exponent)));
+        }
+    }
+}
+
+Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept {
+    const float step = std::ldexp(1.0f, lattice.step_exponent);
+    const auto coordinate = [&](size_t i) {
+        return static_cast<float>(lattice.origin[i] + int32_t{node.center[i]}) * step;
+    };
+    const float half_unit = std::ldexp(1.0f, node.exponent - 15);
+    const auto diagonal = [&](size_t i) { return static_cast<float>(node.diagonal[i]) * (half_unit * 0.5f); };
+    const auto off = [&](size_t i) { return static_cast<float>(node.off_diagonal[i]) * half_unit; };
+    return {.center = {coordinate(0), coordinate(1), coordinate(2)},
+            .l11 = diagonal(0),
+            .l21 = off(0),
+            .l22 = diagonal(1),
+            .l31 = off(1),
+            .l32 = off(2),
+            .l33 = diagonal(2)};
+}
+
+} // namespace prolate::format

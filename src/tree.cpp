@@ -1,0 +1,129 @@
+// Reading an .etree file in place: what TreeView::open has checked (open.cpp), decoded on demand.
+#include <prolate/tree.hpp>
+
+#include "src/bytes.hpp"
+#include "src/format.hpp"
+#include "src/layout.hpp"
+
+#include <cassert>
+
+namespace prolate {
+namespace {
+
+// The lane of a block that a slot is.
+struct Place {
+    const std::byte* block;
+    size_t lane;
+};
+Place place_of(const TreeView& tree, uint32_t slot) {
+    assert(slot < tree.slot_count());
+    return {tree.block(slot / kBlockLanes), slot % kBlockLanes};
+}
+
+} // namespace
+
+uint32_t TreeView::degree() const noexcept {
+    return load_le<uint16_t>(bytes_.data() + kAtDegree);
+}
+
+uint32_t TreeView::first_slot(uint32_t l) const noexcept {
+    assert(l < level_count_);
+    return kBlockLanes * load_le<uint32_t>(bytes_.data() + kHeaderBytes + l * kLevelBytes + kLevelFirstBlock);
+}
+
+bool TreeView::surface_mode() const noexcept {
+    return (load_le<uint32_t>(bytes_.data() + kAtFlags) & kSurfaceMode) != 0;
+}
+
+LevelInfo TreeView::level(uint32_t l) const noexcept {
+    assert(l < level_count_);
+    const std::byte* const row = bytes_.data() + kHeaderBytes + l * kLevelBytes;
+    LevelInfo level;
+    level.first_slot = first_slot(l);
+    level.node_count = load_le<uint32_t>(row + kLevelNodeCount);
+    level.end_byte = load_le<uint64_t>(row + kLevelEndByte);
+    // As numbers, since open() asks for levels that a prefix does not hold.
+    const uint64_t begin =
+        static_cast<uint64_t>(blocks_ - bytes_.data()) + uint64_t{level.first_slot / kBlockLanes} * kBlockBytes;
+    level.block_count = static_cast<uint32_t>((level.end_byte - begin) / kBlockBytes);
+    level.union_volume = load_le<double>(row + kLevelUnionVolume);
+    for (size_t i = 0; i < std::size(kFigures); ++i)
+        level.*kFigures[i] = load_le<float>(row + kLevelFigures + sizeof(float) * i);
+    return level;
+}
+
+BakeInfo TreeView::bake_info() const noexcept {
+    const std::byte* const h = bytes_.data();
+    return {.source_hash = load_le<uint64_t>(h + kAtSourceHash),
+            .options_hash = load_le<uint64_t>(h + kAtOptionsHash),
+            .surface_mode = surface_mode(),
+            .exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0,
+            .proved = (load_le<uint32_t>(h + kAtFlags) & kProved) != 0,
+            .goal_reached = (load_le<uint32_t>(h + kAtFlags) & kGoalMissed) == 0,
+            .solid_volume = load_le<double>(h + kAtSolidVolume),
+            .solid_volume_error = load_le<float>(h + kAtSolidVolumeError),
+            .diagonal = load_le<double>(h + kAtDiagonal),
+            .method = static_cast<Method>(load_le<uint8_t>(h + kAtMethod)),
+            .primitive = static_cast<Primitive>(load_le<uint8_t>(h + kAtPrimitive)),
+            .quality = static_cast<Quality>(load_le<uint8_t>(h + kAtQuality)),
+            .alpha = load_le<float>(h + kAtAlpha),
+            .beta = load_le<float>(h + kAtBeta),
+            .tolerance = load_le<float>(h + kAtTolerance),
+            .distance = load_le<float>(h + kAtDistance),
+            .levels = load_le<uint32_t>(h + kAtLevels),
+            .ellipsoids = load_le<uint32_t>(h + kAtEllipsoids),
+            .seed = load_le<uint64_t>(h + kAtSeed),
+            .resolution = load_le<uint32_t>(h + kAtResolution)};
+}
+
+bool TreeView::is_node(uint32_t slot) const noexcept {
+    const auto [from, lane] = place_of(*this, slot);
+    return load_le<uint16_t>(from + block_offset(kBlockDiagonal, 0, lane)) != 0;
+}
+
+Ellipsoid TreeView::ellipsoid(uint32_t node) const noexcept {
+    assert(is_node(node));
+    const auto [from, lane] = place_of(*this, node);
+    format::PackedNode packed;
+    for (size_t i = 0; i < 3; ++i) {
+        packed.center[i] = load_le<uint16_t>(from + block_offset(kBlockCenter, i, lane));
+        packed.diagonal[i] = load_le<uint16_t>(from + block_offset(kBlockDiagonal, i, lane));
+        packed.off_diagonal[i] = load_le<int16_t>(from + block_offset(kBlockOffDiagonal, i, lane));
+    }
+    packed.exponent = load_le<int8_t>(from + kBlockExponent + lane);
+    return format::decode(packed, lattice_);
+}
+
+ChildRange TreeView::children(uint32_t node) const noexcept {
+    assert(is_node(node));
+    const auto [from, lane] = place_of(*this, node);
+    const ChildRange range{load_le<uint32_t>(from + kBlockFirst + 4 * lane),
+                           load_le<uint8_t>(from + kBlockCount + lane)};
+    return range.first < slot_count() && range.count < kTriangleLeaf ? range : ChildRange{};
+}
+
+TriangleRange TreeView::triangles(uint32_t node) const noexcept {
+    assert(is_node(node));
+    const auto [from, lane] = place_of(*this, node);
+    const auto count = load_le<uint8_t>(from + kBlockCount + lane);
+    if (!has_triangles() || count < kTriangleLeaf) return {};
+    return {load_le<uint32_t>(from + kBlockFirst + 4 * lane), uint32_t{count} - kTriangleLeaf};
+}
+
+Triangle TreeView::triangle(uint32_t t) const noexcept {
+    assert(t < triangle_count_);
+    if (index_bytes(vertex_count_) == 2) {
+        const std::byte* const from = triangles_ + size_t{t} * 6;
+        return {load_le<uint16_t>(from), load_le<uint16_t>(from + 2), load_le<uint16_t>(from + 4)};
+    }
+    const std::byte* const from = triangles_ + size_t{t} * 12;
+    return {load_le<uint32_t>(from), load_le<uint32_t>(from + 4), load_le<uint32_t>(from + 8)};
+}
+
+Vec3 TreeView::vertex(uint32_t v) const noexcept {
+    assert(v < vertex_count_);
+    const std::byte* const from = vertices_ + size_t{v} * kVertexBytes;
+    return {load_le<float>(from), load_le<float>(from + 4), load_le<float>(from + 8)};
+}
+
+} // namespace prolate
