@@ -9,7 +9,8 @@
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 
-#include <prolate/query.hpp>
+#include <prolate/collide.hpp>
+#include <prolate/pairs.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -100,7 +101,7 @@ void tree_tree(benchmark::State& state, uint32_t levels, double offset) {
     };
     const auto scene_a = make(), scene_b = make();
     const TreeView a = *TreeView::open(scene_a.bytes), b = *TreeView::open(scene_b.bytes);
-    CollideContext context;
+    QueryContext context;
     struct Placement {
         Pose a, b;
     };
@@ -121,7 +122,7 @@ void tree_tree(benchmark::State& state, uint32_t levels, double offset) {
         }
         const CollideResult result = at(high + offset);
         hash.add(static_cast<uint64_t>(result.verdict));
-        pair_tests += result.stats.pair_tests, evaluations += result.stats.evaluations;
+        pair_tests += result.stats.pair_tests, evaluations += result.stats.block_tests;
     }
     size_t i = 0;
     for (auto _ : state) {
@@ -129,7 +130,7 @@ void tree_tree(benchmark::State& state, uint32_t levels, double offset) {
         i = (i + 1) % poses.size();
     }
     state.counters["pair_tests"] = static_cast<double>(pair_tests) / static_cast<double>(poses.size());
-    state.counters["evaluations"] = static_cast<double>(evaluations) / static_cast<double>(poses.size());
+    state.counters["block_tests"] = static_cast<double>(evaluations) / static_cast<double>(poses.size());
     state.counters["verdicts"] = hash.value();
 }
 BENCHMARK_CAPTURE(tree_tree, 2_levels_near, 2u, 0.01);

@@ -1,7 +1,7 @@
 // prolate collide: one query between two trees, for trying out and for scripts.
 #include "cli/common.hpp"
 
-#include <prolate/query.hpp>
+#include <prolate/collide.hpp>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -69,21 +69,21 @@ int run(const CollideArguments& a) {
     QueryOptions options;
     options.max_level = a.level.value_or(options.max_level);
     options.max_pair_tests = a.budget.value_or(options.max_pair_tests);
-    CollideContext context;
+    QueryContext context;
     const CollideResult result = collide(tree_a->view(), Pose{}, tree_b->view(), *pose, context, options);
     const char* verdict = kVerdicts[static_cast<size_t>(result.verdict)];
     const bool meet = result.verdict == Verdict::overlapping;
     if (a.json) {
         nlohmann::ordered_json out;
         out["verdict"] = verdict;
-        out["node_a"] = meet ? nlohmann::ordered_json(result.node_a) : nullptr;
-        out["node_b"] = meet ? nlohmann::ordered_json(result.node_b) : nullptr;
+        out["node_a"] = meet ? nlohmann::ordered_json(result.pair.node_a) : nullptr;
+        out["node_b"] = meet ? nlohmann::ordered_json(result.pair.node_b) : nullptr;
         const auto triangle = [](uint32_t t) { return t == kNoTriangle ? nullptr : nlohmann::ordered_json(t); };
-        out["triangle_a"] = triangle(result.triangle_a);
-        out["triangle_b"] = triangle(result.triangle_b);
+        out["triangle_a"] = triangle(result.pair.triangle_a);
+        out["triangle_b"] = triangle(result.pair.triangle_b);
         out["enclosed"] = result.enclosed;
         out["pair_tests"] = result.stats.pair_tests;
-        out["evaluations"] = result.stats.evaluations;
+        out["block_tests"] = result.stats.block_tests;
         out["triangle_tests"] = result.stats.triangle_tests;
         out["deepest_level"] = result.stats.deepest_level;
         print(out.dump(2) + '\n');
@@ -95,10 +95,10 @@ int run(const CollideArguments& a) {
     print(!meet ? fmt::format("{}\n", verdict)
           : result.enclosed
               ? fmt::format("{}: a part of one lies inside the other\n", verdict)
-              : fmt::format("{}: {} of A and {} of B meet\n", verdict, part(result.node_a, result.triangle_a),
-                            part(result.node_b, result.triangle_b)));
-    print(fmt::format("{} pair tests, {} evaluations, {} triangle tests, deepest level {}\n",
-                      grouped(result.stats.pair_tests), grouped(result.stats.evaluations),
+              : fmt::format("{}: {} of A and {} of B meet\n", verdict, part(result.pair.node_a, result.pair.triangle_a),
+                            part(result.pair.node_b, result.pair.triangle_b)));
+    print(fmt::format("{} pair tests, {} block tests, {} triangle tests, deepest level {}\n",
+                      grouped(result.stats.pair_tests), grouped(result.stats.block_tests),
                       grouped(result.stats.triangle_tests), result.stats.deepest_level));
     return kDone;
 }

@@ -2,7 +2,7 @@
 //
 // A stays; B comes along the x axis in 100 poses, from well apart until the centers of the root ellipsoids meet.
 // One context serves all queries, as it would in the loop of a simulator.
-#include <prolate/query.hpp>
+#include <prolate/collide.hpp>
 
 #include <cstdio>
 
@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
     const prolate::Ellipsoid root_a = a->view().ellipsoid(0), root_b = b->view().ellipsoid(0);
     const float start = 2 * (root_a.l11 + root_b.l11);
 
-    prolate::CollideContext context;
+    prolate::QueryContext context;
     prolate::Pose pose; // of B; the rotation stays the identity
     prolate::Verdict before = prolate::Verdict::undecided;
     unsigned long long pair_tests = 0, most = 0, separated = 0;

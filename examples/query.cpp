@@ -1,5 +1,5 @@
 // Asks whether two baked solids touch, the second one moved by X metres.    query A.etree B.etree X
-#include <prolate/query.hpp>
+#include <prolate/collide.hpp>
 
 #include <cstdio>
 #include <cstdlib>
@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
         if (!*tree) return std::fprintf(stderr, "query: %s\n", tree->error().what), 1;
 
     const prolate::Pose pose_a, pose_b{{std::strtof(argv[3], nullptr), 0, 0}, {0, 0, 0, 1}};
-    prolate::CollideContext context; // scratch: keep it, and queries never allocate
+    prolate::QueryContext context; // scratch: keep it, and queries never allocate
     const auto result = prolate::collide(a->view(), pose_a, b->view(), pose_b, context);
 
     const char* const words[] = {"separated", "overlapping", "undecided"};

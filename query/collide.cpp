@@ -1,236 +1,281 @@
-// Tree against tree: simultaneous descent over pairs of nodes of equal level.
+// Tree against tree: simultaneous descent, a block of eight children at a time.
 //
-// From a pair (A, B) that is not separated, A is tested against each child of B and B against each child of A; then
-// only the product of the survivors is tested pair by pair, depth first. A leaf, or a node at max_level, stays while
-// its partner descends. So which pairs are tested depends on neither the order of the descent nor max_level (that
-// only cuts it off): if level l says separated, so does every deeper one.
+// Of a pair of nodes that meet, the larger is opened: its children, up to eight of them in a block, are tested at once
+// against the other (lanes-inl.hpp), and those that are not separated from it make new pairs. Two leaves are decided in
+// double precision (leaves.cpp). Which node is opened depends on the pair alone, so max_level and budgets only cut the
+// descent off: if level l says separated, so does every deeper one.
 //
-// Sound because a child covers its part of the solid and A covers the parts of all its children: if A is apart from
-// B's child i, no part under A meets that part of B.
+// Sound because a node covers the parts of all its children: if B is apart from A's child i, no part under B meets that
+// part of A.
 //
-// Two leaves of exact trees meet if a triangle of one meets a triangle of the other; a leaf ellipsoid of a tree without
-// triangles stands for itself. If nothing meets, no surface crosses another, so each connected component of the one
-// lies wholly inside or outside of the other: one vertex a component (or center a leaf ellipsoid) tells.
+// Depth first, and of the children that meet, that with the deepest overlap first: bodies that touch are found out
+// soon, and for bodies that do not the order makes no difference.
 //
-// Complexity: 2k tests, then at most k^2, for each pair of inner nodes that meets. Stack: one frame a level.
-#include "query/inside.hpp"
-#include "query/separation.hpp"
-#include "query/triangle.hpp"
+// Complexity: one block test for each pair of nodes that meet, unless both are leaves.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/collide.cpp"
+#include "query/targets.hpp" // before foreach_target.h
 
-#include <prolate/query.hpp>
+#include <hwy/foreach_target.h>
+
+#include "query/descent.hpp"
+#include "query/enclosure.hpp"
+#include "query/lanes-inl.hpp"
+#include "query/order.hpp"
+
+#include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cstring>
 #include <utility>
+
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
+namespace {
+
+// QueryContext::Entry::flags
+constexpr uint32_t kOpenB = 1, kLeafA = 2, kLeafB = 4;
+
+template <bool kMargin> class Search {
+public:
+    explicit Search(Descent& descent) : d_(descent), stack_(descent.stack) {}
+
+    Verdict run() {
+        // The roots, as if they were the only children of a node that meets everything.
+        if (budget() < 1) return Verdict::undecided;
+        const bool leaf_a = is_leaf(d_.a, 0);
+        test<true>(d_.b, d_.a.tree.block(0), 0, 1, d_.lattice_a_to_b, 0, leaf_a);
+        d_.roots_meet = size_ > 0;
+        while (size_ > 0) {
+            const auto e = stack_[--size_];
+            const bool leaf = (e.flags & (kLeafA | kLeafB)) == (kLeafA | kLeafB);
+            const bool open_b = (e.flags & kOpenB) != 0;
+            if (leaf) {
+                if (d_.meet(e.node_a, e.node_b)) return Verdict::overlapping;
+                continue;
+            }
+            if (open_b ? e.node_b >= d_.b.limit_from : e.node_a >= d_.a.limit_from) { // max_level ends the descent
+                if (d_.take({e.node_a, e.node_b, kNoTriangle, kNoTriangle})) return Verdict::overlapping;
+                continue;
+            }
+            const bool going =
+                open_b ? open<true>(d_.b, e.node_b, d_.a, e.node_a, d_.lattice_a_to_b, (e.flags & kLeafA) != 0)
+                       : open<false>(d_.a, e.node_a, d_.b, e.node_b, d_.lattice_b_to_a, (e.flags & kLeafB) != 0);
+            if (!going) return Verdict::undecided;
+        }
+        return Verdict::separated;
+    }
+
+private:
+    static bool is_leaf(const Body& body, uint32_t node) { return body.tree.is_leaf(node); }
+    uint64_t budget() const { return d_.options.max_pair_tests - d_.stats.pair_tests; }
+
+    // Tests the children of `node` against `other`, which is one of the other tree; false if the budget is too small.
+    template <bool kB>
+    bool open(Body& body, uint32_t node, const Body& other_body, uint32_t other, const LatticePose& pose,
+              bool other_leaf) {
+        const ChildRange children = body.tree.children(node);
+        if (children.count > budget()) return false;
+        const std::byte* const other_block = other_body.tree.block(other / kBlockLanes);
+        for (uint32_t i = 0; i < children.count; i += kBlockLanes)
+            test<kB>(body, other_block, children.first + i, std::min(children.count - i, kBlockLanes), pose, other,
+                     other_leaf);
+        return true;
+    }
+
+    // One block against one node: pushes the pairs that meet, the deepest last.
+    template <bool kB>
+    void test(Body& body, const std::byte* other_block, uint32_t first, uint32_t count, const LatticePose& pose,
+              uint32_t other, bool other_leaf) {
+        const LaneTag d;
+        const std::byte* const block = body.tree.block(first / kBlockLanes);
+        const Single single = place_here(other_block, other % kBlockLanes, pose);
+        d_.stats.pair_tests += count, ++d_.stats.block_tests;
+        body.deepest = std::max(body.deepest, first + count - 1);
+        const float lattice_margin = kMargin ? margin_in(body.lattice) : 0.0f;
+        const uint32_t boxes = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
+        if (boxes == 0) return;
+        uint32_t meet = 0, larger = 0;
+        alignas(32) float depth[kBlockLanes];
+        const Lanes margin = hn::Set(d, lattice_margin);
+        for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+            const LaneTerms t = evaluate(load_nodes(block, i, body.lattice.step_exponent), single);
+            meet |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
+            larger |= bits_of(hn::Gt(t.size, hn::Set(d, single.size)), i);
+            hn::StoreU(hn::Div(t.p, t.sum), d, depth + i);
+        }
+        meet &= boxes;
+        if (meet == 0) return;
+        // Leaves among the lanes: no children, or a count of triangles.
+        uint32_t leaves = 0;
+        const std::byte* const counts = block + kBlockCount;
+        for (uint32_t i = 0; i < kBlockLanes; ++i) {
+            const auto c = static_cast<uint8_t>(counts[i]);
+            leaves |= uint32_t{c == 0 || c >= 128} << i;
+        }
+        if (first >= body.leaves_from) leaves = 0xff;
+        const uint32_t begin = size_;
+        uint32_t deepest = begin;
+        float least = HUGE_VALF;
+        for (; meet != 0; meet &= meet - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
+            const bool leaf = (leaves >> lane & 1) != 0;
+            const bool open_lane = !leaf && (other_leaf || (larger >> lane & 1) != 0);
+            const uint32_t node_a = kB ? other : first + lane, node_b = kB ? first + lane : other;
+            const uint32_t flags = (open_lane == kB ? kOpenB : 0) | (leaf ? (kB ? kLeafB : kLeafA) : 0) |
+                                   (other_leaf ? (kB ? kLeafA : kLeafB) : 0);
+            if (depth[lane] < least) least = depth[lane], deepest = size_;
+            stack_[size_++] = {node_a, node_b, depth[lane], flags};
+        }
+        std::swap(stack_[deepest], stack_[size_ - 1]);
+    }
+
+    // options.margin + skin in lattice steps, rounded up.
+    float margin_in(const LatticeInfo& lattice) const {
+        return static_cast<float>(std::ldexp((double{d_.options.margin} + d_.skin) * kRoundUp, -lattice.step_exponent));
+    }
+    static constexpr double kRoundUp = 1 + 0x1p-20; // also pays for the rounding of margin |n|
+
+    // Opening a node takes one entry off and puts at most kMaxDegree on, and no pair lies deeper than both trees
+    // together.
+    static_assert(QueryContext::kEntries > 2 * (kMaxLevels - 1) * (kMaxDegree - 1) + 1);
+    Descent& d_;
+    QueryContext::Entry* const stack_;
+    uint32_t size_ = 0;
+};
+
+Verdict descend_target(Descent& descent) {
+    return descent.options.margin + descent.skin > 0 ? Search<true>(descent).run() : Search<false>(descent).run();
+}
+
+} // namespace
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace prolate::query {
+HWY_EXPORT(descend_target);
+Verdict descend(Descent& descent) noexcept {
+    return HWY_DYNAMIC_DISPATCH(descend_target)(descent);
+}
+} // namespace prolate::query
 
 namespace prolate {
 namespace {
 
-using query::PairVerdict;
-
-// Swapped arguments must give the same verdict in spite of rounding, so each call works in one fixed order.
-template <size_t Words, class T> bool bits_less(const T& x, const T& y) {
-    using Bits = std::array<uint32_t, Words>;
-    return std::bit_cast<Bits>(x) < std::bit_cast<Bits>(y);
-}
-bool pose_less(const Pose& x, const Pose& y) {
-    return bits_less<7>(x, y);
-}
-bool tree_less(const TreeView& x, const TreeView& y) {
-    const auto p = x.bytes(), q = y.bytes();
-    if (p.size() != q.size()) return p.size() < q.size();
-    return p.data() != q.data() && std::memcmp(p.data(), q.data(), p.size()) < 0;
+// The whole query with the bodies in their fixed order.
+Verdict run(query::Descent& d) {
+    Verdict verdict = query::descend(d);
+    if (d.found > 0) verdict = Verdict::overlapping;
+    d.stats.deepest_level = std::max(d.a.deepest_level(), d.b.deepest_level());
+    if (verdict != Verdict::separated || !d.roots_meet) return verdict;
+    return query::look_inside(d.a.tree, d.b.tree, d.b_to_a, d.stats, d.options.max_pair_tests);
 }
 
-uint32_t next_bit(uint64_t mask, uint32_t from) {
-    return from < kMaxDegree ? static_cast<uint32_t>(std::countr_zero(mask & (~uint64_t{0} << from))) : kMaxDegree;
+MeetingPair exchanged(const MeetingPair& pair) {
+    return {pair.node_b, pair.node_a, pair.triangle_b, pair.triangle_a};
 }
-static_assert(kMaxDegree == 64, "children are one bit each of a uint64_t");
 
-class Descent {
-public:
-    Descent(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, CollideContext::Frame* frames,
-            const QueryOptions& options)
-        : a_(a), b_(b), pose_a_(pose_a), pose_b_(pose_b), b_to_a_(query::relative_pose(pose_a, pose_b)),
-          frames_(frames), options_(options) {}
+// ---- coherence ----
 
-    CollideResult run() {
-        result_.verdict = descend();
-        if (result_.verdict == Verdict::separated && roots_meet_) result_.verdict = look_inside();
-        return result_;
+// Of the smaller root: the first skin, the thinnest and the thickest; and how many times as thick as the last motion.
+constexpr double kFirstSkin = 0x1p-8, kThinnestSkin = 0x1p-12, kThickestSkin = 0x1p-5, kSkinSteps = 4;
+constexpr double kRoundDown = 1 - 0x1p-20; // more than the rounding of a float
+
+// No point of body B has moved farther than this, as body A sees it, metres; NaN if a pose is not finite.
+double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, const query::PlacedEllipsoid& root_b) {
+    const query::RelativePose before = query::relative_pose(cache.pose_a, cache.pose_b);
+    const query::RelativePose now = query::relative_pose(pose_a, pose_b);
+    double turned = 0;
+    for (glm::length_t c = 0; c < 3; ++c) {
+        const glm::dvec3 column = now.rotation[c] - before.rotation[c];
+        turned += glm::dot(column, column);
     }
+    // Both placements are rounded, by less than kSeparationMargin of all lengths (separation.hpp).
+    return std::sqrt(turned) * root_b.reach + glm::length(now.translation - before.translation) +
+           query::kSeparationMargin * (2 * root_b.reach + before.distance + now.distance);
+}
 
-private:
-    using Frame = CollideContext::Frame;
-    enum class Test { apart, meets, no_budget };
+// The roots' bounding spheres, roughly, are so far apart.
+double gap_of_spheres(const query::Descent& d) {
+    const query::PlacedEllipsoid a = query::place(d.a.tree.ellipsoid(0)),
+                                 b = query::place(d.b.tree.ellipsoid(0), d.b_to_a);
+    return glm::distance(a.center, b.center) - a.size - b.size;
+}
 
-    Test test(uint32_t node_a, uint32_t node_b, uint32_t level) {
-        if (result_.stats.pair_tests >= options_.max_pair_tests) return Test::no_budget;
-        const auto pair =
-            query::test_pair(query::place(a_.ellipsoid(node_a)), query::place(b_.ellipsoid(node_b), b_to_a_));
-        ++result_.stats.pair_tests;
-        result_.stats.evaluations += pair.evaluations;
-        result_.stats.deepest_level = std::max(result_.stats.deepest_level, level);
-        return pair.verdict == PairVerdict::separated ? Test::apart : Test::meets;
-    }
+// Does the pair that the cache names exist?
+bool names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b) {
+    const auto good = [](const TreeView& tree, uint32_t node, uint32_t triangle) {
+        if (node >= tree.slot_count() || !tree.is_node(node) || !tree.is_leaf(node)) return false;
+        const TriangleRange range = tree.triangles(node);
+        return range.count == 0 ? triangle == kNoTriangle : triangle - range.first < range.count;
+    };
+    return good(a, pair.node_a, pair.triangle_a) && good(b, pair.node_b, pair.triangle_b);
+}
 
-    // What takes a node's place one level below `level`: its children, or itself if it stays.
-    bool stays(const TreeView& tree, uint32_t node, uint32_t level) const {
-        return level >= options_.max_level || tree.is_leaf(node);
-    }
-    ChildRange below(const TreeView& tree, uint32_t node, uint32_t level) const {
-        return stays(tree, node, level) ? ChildRange{node, 1} : tree.children(node);
-    }
-
-    // Fills the masks of survivors; false if the budget ran out. A node that stays survives by itself.
-    bool open(Frame& frame) {
-        const auto sift = [&](const TreeView& tree, uint32_t node, uint64_t& survivors, auto&& test_child) {
-            const ChildRange children = below(tree, node, frame.level);
-            survivors = stays(tree, node, frame.level) ? 1 : 0;
-            if (survivors) return true;
-            for (uint32_t i = 0; i < children.count; ++i) {
-                const Test outcome = test_child(children.first + i);
-                if (outcome == Test::no_budget) return false;
-                if (outcome == Test::meets) survivors |= uint64_t{1} << i;
-            }
-            return true;
-        };
-        const uint32_t level = frame.level + 1;
-        return sift(b_, frame.node_b, frame.children_b, [&](uint32_t i) { return test(frame.node_a, i, level); }) &&
-               sift(a_, frame.node_a, frame.children_a, [&](uint32_t i) { return test(i, frame.node_b, level); });
-    }
-
-    Verdict descend() {
-        const Test roots = test(0, 0, 0);
-        if (roots == Test::no_budget) return Verdict::undecided;
-        if (roots == Test::apart) return Verdict::separated; // what they enclose, too
-        roots_meet_ = true;
-        if (stays(a_, 0, 0) && stays(b_, 0, 0)) return leaves_meet(0, 0) ? Verdict::overlapping : Verdict::separated;
-        uint32_t depth = 0; // the frame in work; its index is its level
-        frames_[0] = {.node_a = 0, .node_b = 0, .children_a = 0, .children_b = 0, .next_a = 0, .next_b = 0, .level = 0};
-        if (!open(frames_[0])) return Verdict::undecided;
-        for (;;) {
-            Frame& frame = frames_[depth];
-            uint32_t i = next_bit(frame.children_a, frame.next_a), j = next_bit(frame.children_b, frame.next_b);
-            if (j == kMaxDegree) { // next row of the product
-                i = next_bit(frame.children_a, i + 1);
-                j = next_bit(frame.children_b, 0);
-            }
-            if (i == kMaxDegree || j == kMaxDegree) {
-                if (depth == 0) return Verdict::separated;
-                --depth;
-                continue;
-            }
-            frame.next_a = i, frame.next_b = j + 1;
-
-            const uint32_t node_a = below(a_, frame.node_a, frame.level).first + i;
-            const uint32_t node_b = below(b_, frame.node_b, frame.level).first + j;
-            const uint32_t level = frame.level + 1;
-            // If one node stayed, open() has tested this very pair.
-            if (!stays(a_, frame.node_a, frame.level) && !stays(b_, frame.node_b, frame.level)) {
-                const Test outcome = test(node_a, node_b, level);
-                if (outcome == Test::no_budget) return Verdict::undecided;
-                if (outcome == Test::apart) continue;
-            }
-            if (stays(a_, node_a, level) && stays(b_, node_b, level)) {
-                if (!leaves_meet(node_a, node_b)) continue;
-                result_.node_a = node_a, result_.node_b = node_b;
-                return Verdict::overlapping;
-            }
-            Frame& next = frames_[++depth];
-            next = {.node_a = node_a,
-                    .node_b = node_b,
-                    .children_a = 0,
-                    .children_b = 0,
-                    .next_a = 0,
-                    .next_b = 0,
-                    .level = level};
-            if (!open(next)) return Verdict::undecided;
-        }
-    }
-
-    // Of two ellipsoids that meet and go no deeper: do their triangles, if they have any?
-    bool leaves_meet(uint32_t node_a, uint32_t node_b) {
-        if (!a_.is_leaf(node_a) || !b_.is_leaf(node_b)) return true; // max_level ended the descent
-        const TriangleRange in_a = a_.triangles(node_a), in_b = b_.triangles(node_b);
-        const auto meets = [&](const auto& x, const auto& y) {
-            ++result_.stats.triangle_tests;
-            return !query::apart(x, y);
-        };
-        if (in_a.count == 0 && in_b.count == 0) return true;
-        if (in_a.count == 0) {
-            const auto ellipsoid = query::place(a_.ellipsoid(node_a));
-            for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
-                if (meets(query::place(b_, t, b_to_a_), ellipsoid)) return result_.triangle_b = t, true;
-            return false;
-        }
-        if (in_b.count == 0) {
-            const auto ellipsoid = query::place(b_.ellipsoid(node_b), b_to_a_);
-            for (uint32_t t = in_a.first; t < in_a.first + in_a.count; ++t)
-                if (meets(query::place(a_, t), ellipsoid)) return result_.triangle_a = t, true;
-            return false;
-        }
-        for (uint32_t j = in_b.first; j < in_b.first + in_b.count; ++j) {
-            const auto triangle_b = query::place(b_, j, b_to_a_);
-            for (uint32_t i = in_a.first; i < in_a.first + in_a.count; ++i)
-                if (meets(query::place(a_, i), triangle_b)) return result_.triangle_a = i, result_.triangle_b = j, true;
-        }
-        return false;
-    }
-
-    // No surface meets another: is a part of one body inside the other?
-    Verdict look_inside() {
-        const Verdict first = encloses(a_, pose_a_, b_, pose_b_);
-        return first == Verdict::separated ? encloses(b_, pose_b_, a_, pose_a_) : first;
-    }
-    Verdict encloses(const TreeView& outer, const Pose& pose_outer, const TreeView& inner, const Pose& pose_inner) {
-        if (!outer.has_triangles() || outer.bake_info().surface_mode) return Verdict::separated;
-        const query::RelativePose to_outer = query::relative_pose(pose_outer, pose_inner);
-        const auto look = [&](const Vec3& p) {
-            const auto winding = query::winding_number(outer, query::place(p, to_outer), result_.stats.pair_tests,
-                                                       options_.max_pair_tests);
-            if (!winding) return Verdict::undecided;
-            result_.enclosed = *winding != 0;
-            return result_.enclosed ? Verdict::overlapping : Verdict::separated;
-        };
-        Verdict verdict = Verdict::separated;
-        for (uint32_t v = 0; v < inner.component_count() && verdict == Verdict::separated; ++v)
-            verdict = look(inner.vertex(v));
-        for (uint32_t n = 0; n < inner.node_count() && !inner.has_triangles() && verdict == Verdict::separated; ++n)
-            if (inner.is_leaf(n)) verdict = look(inner.ellipsoid(n).center);
-        return verdict;
-    }
-
-    const TreeView& a_;
-    const TreeView& b_;
-    const Pose& pose_a_;
-    const Pose& pose_b_;
-    const query::RelativePose b_to_a_;
-    Frame* const frames_;
-    const QueryOptions& options_;
-    bool roots_meet_ = false;
-    CollideResult result_;
-};
+// Only whole searches are remembered: a level limit asks another question.
+bool usable(const PairCache* cache, const TreeView& a, const TreeView& b, const QueryOptions& options) {
+    return cache && options.max_level + 1 >= std::max(a.level_count(), b.level_count());
+}
 
 } // namespace
 
+CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
+                             std::span<MeetingPair> pairs, QueryContext& context,
+                             const QueryOptions& options) noexcept {
+    const bool swap = query::must_swap(a, pose_a, b, pose_b);
+    query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
+                                  : query::Descent(a, pose_a, b, pose_b, context, options);
+    descent.all = true;
+    descent.pairs = pairs;
+    const Verdict verdict = run(descent);
+    if (swap)
+        for (MeetingPair& pair : pairs.first(static_cast<size_t>(std::min<uint64_t>(descent.found, pairs.size()))))
+            pair = exchanged(pair);
+    return {verdict, verdict == Verdict::overlapping && descent.found == 0, descent.found, descent.stats};
+}
+
 CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                      CollideContext& context, const QueryOptions& options) noexcept {
-    const bool swap = pose_a == pose_b ? tree_less(b, a) : pose_less(pose_b, pose_a);
-    if (!swap) return Descent(a, pose_a, b, pose_b, context.frames, options).run();
-    CollideResult result = Descent(b, pose_b, a, pose_a, context.frames, options).run();
-    std::swap(result.node_a, result.node_b);
-    std::swap(result.triangle_a, result.triangle_b);
+                      QueryContext& context, const QueryOptions& options, PairCache* cache) noexcept {
+    if (!usable(cache, a, b, options)) cache = nullptr;
+    double moved = 0, smaller = 0;
+    if (cache) {
+        const query::PlacedEllipsoid root_a = query::place(a.ellipsoid(0)), root_b = query::place(b.ellipsoid(0));
+        smaller = std::min(root_a.size, root_b.size);
+        if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b);
+        if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)
+            return {Verdict::separated, false, {}, {}};
+    }
+
+    const bool swap = query::must_swap(a, pose_a, b, pose_b);
+    query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
+                                  : query::Descent(a, pose_a, b, pose_b, context, options);
+    MeetingPair pair;
+    descent.pairs = {&pair, 1};
+    const auto answer = [&](Verdict verdict) {
+        if (swap) pair = exchanged(pair);
+        return CollideResult{verdict, verdict == Verdict::overlapping && descent.found == 0, pair, descent.stats};
+    };
+    if (!cache) return answer(run(descent));
+
+    if (cache->verdict == Verdict::overlapping && names_leaves(cache->pair, a, b)) {
+        const MeetingPair last = swap ? exchanged(cache->pair) : cache->pair;
+        if (descent.meets(last)) {
+            descent.take(last);
+            cache->pose_a = pose_a, cache->pose_b = pose_b;
+            return answer(Verdict::overlapping);
+        }
+    }
+    const double skin = cache->verdict == Verdict::undecided
+                            ? kFirstSkin * smaller
+                            : std::clamp(kSkinSteps * moved, kThinnestSkin * smaller, kThickestSkin * smaller);
+    descent.set_skin(static_cast<float>(skin));
+    const CollideResult result = answer(run(descent));
+    double distance = options.margin + descent.skin;
+    if (!descent.roots_meet) distance = std::max(distance, gap_of_spheres(descent));
+    *cache = {result.verdict, result.pair, static_cast<float>(distance * kRoundDown), pose_a, pose_b};
     return result;
 }
 
-Verdict collide(const Ellipsoid& a, const Pose& pose_a, const Ellipsoid& b, const Pose& pose_b) noexcept {
-    const bool swap = pose_a == pose_b ? bits_less<9>(b, a) : pose_less(pose_b, pose_a);
-    const auto pair = swap ? query::test_pair(query::place(b), query::place(a, query::relative_pose(pose_b, pose_a)))
-                           : query::test_pair(query::place(a), query::place(b, query::relative_pose(pose_a, pose_b)));
-    return pair.verdict == PairVerdict::separated ? Verdict::separated : Verdict::overlapping;
-}
-
 } // namespace prolate
+#endif // HWY_ONCE

@@ -1,132 +1,162 @@
+// Counting the crossings of a ray along an axis: eight nodes at a time, depth first.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/inside.cpp"
+#include "query/targets.hpp" // before foreach_target.h
+
+#include <hwy/foreach_target.h>
+
 #include "query/inside.hpp"
+#include "query/ray_lanes-inl.hpp"
+#include "src/bytes.hpp"
 
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
+#include <bit>
 
-namespace prolate::query {
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
-using glm::dvec3;
-
-int sign_of(double x) {
-    return (x > 0) - (x < 0);
-}
-
-// Sign of a b - c d, exactly. Rounding keeps the order of the products; the error of each is a double.
-int sign_of_difference(double a, double b, double c, double d) {
-    const double ab = a * b, cd = c * d;
-    if (ab != cd) return sign_of(ab - cd);
-    const double ab_error = std::fma(a, b, -ab), cd_error = std::fma(c, d, -cd);
-    return (ab_error > cd_error) - (ab_error < cd_error);
-}
-
-// On which side of the projected edge from a to b the origin lies: +1 left, -1 right; 0 only if a and b coincide there.
-int side(const dvec3& a, const dvec3& b) {
-    if (const int sign = sign_of_difference(a.x, b.y, a.y, b.x); sign != 0) return sign;
-    // Of (a.x - t)(b.y - t^2) - (a.y - t^2)(b.x - t) the leading term.
-    return a.y != b.y ? sign_of(a.y - b.y) : sign_of(b.x - a.x);
-}
-
-// An exact sum of doubles: parts of growing size that do not overlap, so that the last one that is not zero decides.
-class Sum {
+class WindingSearch {
 public:
-    void add(double x) {
-        for (size_t i = 0; i < size_; ++i) {
-            const double s = x + parts_[i], from_part = s - x;
-            parts_[i] = (x - (s - from_part)) + (parts_[i] - from_part);
-            x = s;
-        }
-        parts_[size_++] = x;
-    }
-    void add_product(double a, double b) {
-        const double ab = a * b;
-        add(std::fma(a, b, -ab));
-        add(ab);
-    }
-    int sign() const {
-        for (size_t i = size_; i-- > 0;)
-            if (parts_[i] != 0) return sign_of(parts_[i]);
-        return 0;
+    WindingSearch(const TreeView& tree, const PlacedPoint& point, QueryStats& stats, uint64_t most_tests)
+        : tree_(tree), point_(point), at_(lattice_point(point, tree.lattice())), stats_(stats), most_tests_(most_tests),
+          step_exponent_(tree.lattice().step_exponent) {}
+
+    std::optional<int64_t> run() {
+        if (tree_.is_leaf(0)) return crossings_of(tree_.triangles(0), {});
+        const std::optional<Start> start = shortest();
+        if (!start) return {};
+        const bool finished = start->direction.axis == 0   ? walk<0>(*start)
+                              : start->direction.axis == 1 ? walk<1>(*start)
+                                                           : walk<2>(*start);
+        return finished ? std::optional(winding_) : std::nullopt;
     }
 
 private:
-    std::array<double, 24> parts_; // six triple products of four terms each
-    size_t size_ = 0;
+    struct Family {
+        uint32_t block, left, mask; // the block looked at, siblings beyond it, lanes of it still to be opened
+    };
+    struct Start {
+        AxisDirection direction;
+        Family family; // the children of the root
+    };
+
+    bool take(uint32_t count) {
+        if (count > most_tests_ - stats_.pair_tests) return false;
+        stats_.pair_tests += count, ++stats_.block_tests;
+        return true;
+    }
+
+    // The direction in which the fewest children of the root are met.
+    std::optional<Start> shortest() {
+        const ChildRange children = tree_.children(0);
+        const uint32_t first = children.first / kBlockLanes;
+        int met[6] = {};
+        uint32_t lanes[6] = {}; // of the first block
+        for (uint32_t i = 0; i < children.count; i += kBlockLanes) {
+            const uint32_t count = std::min(children.count - i, kBlockLanes), used = (1u << count) - 1;
+            if (!take(count)) return {};
+            const std::byte* const block = tree_.block(first + i / kBlockLanes);
+            const AxisMask masks[3] = {axis_block<0>(block, step_exponent_, at_),
+                                       axis_block<1>(block, step_exponent_, at_),
+                                       axis_block<2>(block, step_exponent_, at_)};
+            for (size_t k = 0; k < 6; ++k) {
+                const uint32_t mask = (k % 2 == 0 ? masks[k / 2].ahead : masks[k / 2].behind) & used;
+                met[k] += std::popcount(mask);
+                if (i == 0) lanes[k] = mask;
+            }
+        }
+        const auto least = static_cast<uint32_t>(std::min_element(met, met + 6) - met);
+        const uint32_t left = children.count - std::min(children.count, kBlockLanes);
+        return Start{{least / 2, least % 2 != 0}, {first, left, lanes[least]}};
+    }
+
+    // False if the tests run out.
+    template <size_t kAxis> bool walk(const Start& start) {
+        Family stack[kMaxLevels];
+        stack[0] = start.family;
+        const auto look = [&](Family& family) {
+            const uint32_t count = std::min(family.left, kBlockLanes);
+            if (!take(count)) return false;
+            const AxisMask mask = axis_block<kAxis>(tree_.block(family.block), step_exponent_, at_);
+            family.mask = (start.direction.negative ? mask.behind : mask.ahead) & ((1u << count) - 1);
+            family.left -= count;
+            return true;
+        };
+        for (uint32_t depth = 0;;) {
+            Family& family = stack[depth];
+            if (family.mask == 0) {
+                if (family.left > 0) {
+                    ++family.block;
+                    if (!look(family)) return false;
+                } else if (depth-- == 0) {
+                    return true;
+                }
+                continue;
+            }
+            const auto lane = static_cast<uint32_t>(std::countr_zero(family.mask));
+            family.mask &= family.mask - 1;
+            const std::byte* const block = tree_.block(family.block);
+            const uint32_t count = load_le<uint8_t>(block + kBlockCount + lane);
+            const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+            if (count >= kTriangleLeaf) {
+                winding_ += crossings_of({first, count - kTriangleLeaf}, start.direction);
+                continue;
+            }
+            stack[++depth] = {first / kBlockLanes, count, 0};
+            if (!look(stack[depth])) return false;
+        }
+    }
+
+    int64_t crossings_of(const TriangleRange& triangles, const AxisDirection& direction) {
+        stats_.triangle_tests += triangles.count;
+        return crossings(tree_, triangles, point_.position, direction);
+    }
+
+    const TreeView& tree_;
+    const PlacedPoint& point_;
+    const LatticePoint at_;
+    QueryStats& stats_;
+    const uint64_t most_tests_;
+    const int32_t step_exponent_;
+    int64_t winding_ = 0;
 };
 
-// Sign of a.(b x c).
-int sign_of_determinant(const dvec3& a, const dvec3& b, const dvec3& c) {
-    Sum sum;
-    const auto add_triple = [&sum](double x, double y, double z) { // x y z
-        const double xy = x * y;
-        sum.add_product(std::fma(x, y, -xy), z);
-        sum.add_product(xy, z);
-    };
-    add_triple(a.x, b.y, c.z), add_triple(b.x, c.y, a.z), add_triple(c.x, a.y, b.z);
-    add_triple(-a.y, b.x, c.z), add_triple(-b.y, c.x, a.z), add_triple(-c.y, a.x, b.z);
-    return sum.sign();
-}
-
-// How the ray from the origin along +z crosses the triangle: +1 outwards, -1 inwards, 0 not at all.
-int crossing(const dvec3& a, const dvec3& b, const dvec3& c) {
-    const int turn = side(a, b);
-    if (turn == 0 || side(b, c) != turn || side(c, a) != turn) return 0;
-    const auto [low, high] = std::minmax({a.z, b.z, c.z});
-    if (low > 0) return turn;
-    if (high < 0) return 0;
-    return sign_of_determinant(a, b, c) == turn ? turn : 0;
-}
-
-// Does the ray from `p` along +z miss the box of the ellipsoid?
-bool misses(const Ellipsoid& e, const PlacedPoint& p) {
-    const PlacedEllipsoid placed = place(e);
-    const double slack = kSeparationMargin * (p.reach + placed.reach);
-    const dvec3 r = placed.center - p.position;
-    const auto half = [&](double l1, double l2, double l3) { return std::sqrt(l1 * l1 + l2 * l2 + l3 * l3) + slack; };
-    return std::abs(r.x) > half(e.l11, 0, 0) || std::abs(r.y) > half(e.l21, e.l22, 0) ||
-           r.z < -half(e.l31, e.l32, e.l33);
+std::optional<int64_t> winding_number_target(const TreeView& tree, const PlacedPoint& point, QueryStats& stats,
+                                             uint64_t most_tests) {
+    return WindingSearch(tree, point, stats, most_tests).run();
 }
 
 } // namespace
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace prolate::query {
+
+using glm::dvec3;
 
 PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept {
     const dvec3 exact{p.x, p.y, p.z};
     return {to_frame.rotation * exact + to_frame.translation, glm::length(exact) + to_frame.distance};
 }
 
-std::optional<int64_t> winding_number(const TreeView& tree, const PlacedPoint& point, uint64_t& tests,
+bool outside(const PlacedEllipsoid& e, const PlacedPoint& point) noexcept {
+    // Seen where the ellipsoid is the unit ball, the point itself is the direction: n = L^-T L^-1 d.
+    const dvec3 d = point.position - e.center;
+    const glm::dmat3 to_ball = glm::inverse(e.factor);
+    const dvec3 n = (to_ball * d) * to_ball;
+    return glm::dot(n, d) - glm::length(n * e.factor) > kSeparationMargin * glm::length(n) * (e.reach + point.reach);
+}
+
+HWY_EXPORT(winding_number_target);
+std::optional<int64_t> winding_number(const TreeView& tree, const PlacedPoint& point, QueryStats& stats,
                                       uint64_t most_tests) noexcept {
-    const auto corner = [&](uint32_t v) {
-        const Vec3 p = tree.vertex(v);
-        return dvec3(p.x, p.y, p.z) - point.position;
-    };
-    int64_t winding = 0;
-    struct {
-        uint32_t next, end;
-    } stack[kMaxLevels] = {{0, 1}}; // siblings still to be looked at
-    for (uint32_t depth = 0;;) {
-        if (stack[depth].next == stack[depth].end) {
-            if (depth == 0) return winding;
-            --depth;
-            continue;
-        }
-        const uint32_t node = stack[depth].next++;
-        if (tests >= most_tests) return {};
-        ++tests;
-        if (misses(tree.ellipsoid(node), point)) continue;
-        if (const ChildRange children = tree.children(node); children.count > 0) {
-            stack[++depth] = {children.first, children.first + children.count};
-            continue;
-        }
-        const TriangleRange triangles = tree.triangles(node);
-        for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t) {
-            const auto [a, b, c] = tree.triangle(t);
-            winding += crossing(corner(a), corner(b), corner(c));
-        }
-    }
+    return HWY_DYNAMIC_DISPATCH(winding_number_target)(tree, point, stats, most_tests);
 }
 
 } // namespace prolate::query
+#endif // HWY_ONCE

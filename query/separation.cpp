@@ -1,5 +1,7 @@
 #include "query/separation.hpp"
 
+#include "query/symmetric.hpp"
+
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -21,32 +23,8 @@ dvec3 to_double(const Vec3& v) {
     return {v.x, v.y, v.z};
 }
 
-// Rotation of a quaternion of any length but 0. Squares and products of floats are exact in double.
-dmat3 rotation_matrix(const Quat& q) {
-    const double x = q.x, y = q.y, z = q.z, w = q.w;
-    const double s = 2 / (x * x + y * y + z * z + w * w);
-    return {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)}, // columns
-            {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
-            {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}};
-}
-
-double trace(const dmat3& m) {
-    return m[0][0] + m[1][1] + m[2][2];
-}
-
 double frobenius(const dmat3& m) {
     return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
-}
-
-// Adjugate of a symmetric matrix: adj(Q) Q = det(Q) I.
-dmat3 adjugate(const dmat3& q) {
-    const double a = q[1][1] * q[2][2] - q[1][2] * q[1][2];
-    const double b = q[0][2] * q[1][2] - q[0][1] * q[2][2];
-    const double c = q[0][1] * q[1][2] - q[0][2] * q[1][1];
-    const double d = q[0][0] * q[2][2] - q[0][2] * q[0][2];
-    const double e = q[0][1] * q[0][2] - q[0][0] * q[1][2];
-    const double f = q[0][0] * q[1][1] - q[0][1] * q[0][1];
-    return {{a, b, c}, {b, d, e}, {c, e, f}};
 }
 
 dmat3 factor_of(const Ellipsoid& e) {
@@ -54,6 +32,15 @@ dmat3 factor_of(const Ellipsoid& e) {
 }
 
 } // namespace
+
+// Squares and products of floats are exact in double.
+dmat3 rotation_matrix(const Quat& q) noexcept {
+    const double x = q.x, y = q.y, z = q.z, w = q.w;
+    const double s = 2 / (x * x + y * y + z * z + w * w);
+    return {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)}, // columns
+            {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
+            {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}};
+}
 
 RelativePose relative_pose(const Pose& a, const Pose& b) noexcept {
     const dmat3 rotation_a = rotation_matrix(a.rotation), rotation_b = rotation_matrix(b.rotation);
@@ -65,6 +52,10 @@ RelativePose relative_pose(const Pose& a, const Pose& b) noexcept {
         out = {dmat3(dvec3(nan), dvec3(nan), dvec3(nan)), dvec3(nan), nan};
     }
     return out;
+}
+
+RelativePose inverse(const RelativePose& pose) noexcept {
+    return {glm::transpose(pose.rotation), -(pose.translation * pose.rotation), pose.distance};
 }
 
 PlacedEllipsoid place(const Ellipsoid& e) noexcept {

@@ -47,6 +47,9 @@ inline constexpr double kSeparationMargin = 0x1p-45;
 inline constexpr double kOverlapMargin = 0x1p-43;
 inline constexpr uint32_t kMaxEvaluations = 16;
 
+/// Rotation of a quaternion of any length but 0.
+glm::dmat3 rotation_matrix(const Quat& q) noexcept;
+
 /// Body B as seen from body A's frame: x_a = rotation x_b + translation. All NaN if a pose is not finite or a
 /// quaternion zero, so that nothing separates.
 struct RelativePose {
@@ -55,6 +58,8 @@ struct RelativePose {
     double distance; // |t2 - t1|
 };
 RelativePose relative_pose(const Pose& a, const Pose& b) noexcept;
+/// Body A as seen from body B's frame. The translation is rounded three times more, by 3 u |d| in all.
+RelativePose inverse(const RelativePose& pose) noexcept;
 
 /// An ellipsoid placed in A's frame.
 struct PlacedEllipsoid {

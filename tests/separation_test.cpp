@@ -7,6 +7,7 @@
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 
+#include <prolate/pairs.hpp>
 #include <prolate/query.hpp>
 
 #include <gtest/gtest.h>

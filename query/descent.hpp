@@ -1,0 +1,66 @@
+// One collide() query: what the vectorised descent (collide.cpp) and the decisions at its leaves (leaves.cpp) share.
+#pragma once
+
+#include "query/lattice.hpp"
+#include "query/separation.hpp"
+
+#include <prolate/collide.hpp>
+
+#include <cstdint>
+#include <span>
+
+namespace prolate::query {
+
+/// A tree as the descent sees it.
+struct Body {
+    const TreeView& tree;
+    const LatticeInfo lattice;
+    uint32_t leaves_from; ///< slots from here on are leaves: the last level of the bytes
+    uint32_t limit_from;  ///< slots from here on are too deep for QueryOptions::max_level to be opened
+    uint32_t deepest = 0; ///< largest slot that was tested
+
+    uint32_t deepest_level() const noexcept;
+};
+
+Body body(const TreeView& tree, uint32_t max_level) noexcept;
+
+struct Descent {
+    Body a, b;
+    const RelativePose b_to_a;
+    const LatticePose lattice_b_to_a, lattice_a_to_b;
+    const QueryOptions& options;
+    QueryContext::Entry* const stack;
+    QueryStats stats;
+
+    bool all = false; ///< go on after the first pair
+    std::span<MeetingPair> pairs;
+    uint64_t found = 0;
+
+    /// Nodes are parted only if they are farther apart than options.margin + skin, metres. Leaves that are nearer, but
+    /// beyond options.margin, shrink the skin to what they leave; so if the bodies turn out to be separated, they are
+    /// farther apart than margin + skin.
+    float skin = 0;
+    bool roots_meet = false;
+
+    Descent(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
+            QueryContext& context, const QueryOptions& query_options) noexcept;
+
+    /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query.
+    bool meet(uint32_t node_a, uint32_t node_b) noexcept;
+    /// Takes a pair that meets. True to stop the query.
+    bool take(const MeetingPair& pair) noexcept;
+    /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any.
+    bool meets(const MeetingPair& pair) noexcept;
+
+    /// Starts with this skin.
+    void set_skin(float distance) noexcept;
+
+private:
+    template <class Apart> bool parted(Apart&& apart) noexcept;
+    float least_skin_ = 0;
+};
+
+/// The descent itself: separated, overlapping (surfaces or leaves), or undecided (out of budget).
+Verdict descend(Descent& descent) noexcept;
+
+} // namespace prolate::query

@@ -1,0 +1,106 @@
+// What the descent's float tests leave open is decided here, in double precision.
+#include "query/descent.hpp"
+#include "query/gap.hpp"
+#include "query/triangle.hpp"
+#include "query/triangle_ellipsoid.hpp"
+#include "query/triangle_lanes.hpp"
+
+namespace prolate::query {
+namespace {
+
+// Skins below this share of the first one are given up: nearly touching bodies gain nothing from them.
+constexpr float kLeastSkin = 0x1p-6f;
+
+// Distances of ellipsoids are found to this share of the lengths that enter, before they are compared with a margin.
+constexpr double kDistanceTolerance = 1e-9;
+
+} // namespace
+
+Body body(const TreeView& tree, uint32_t max_level) noexcept {
+    const uint32_t last = tree.level_count() - 1;
+    const uint32_t limit = max_level < last ? tree.first_slot(max_level) : UINT32_MAX;
+    return {tree, tree.lattice(), tree.first_slot(last), limit};
+}
+
+uint32_t Body::deepest_level() const noexcept {
+    uint32_t level = tree.level_count() - 1;
+    while (level > 0 && deepest < tree.first_slot(level)) --level;
+    return level;
+}
+
+Descent::Descent(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
+                 QueryContext& context, const QueryOptions& query_options) noexcept
+    : a(body(tree_a, query_options.max_level)), b(body(tree_b, query_options.max_level)),
+      b_to_a(relative_pose(pose_a, pose_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
+      lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(query_options),
+      stack(context.entries) {}
+
+void Descent::set_skin(float distance) noexcept {
+    skin = distance;
+    least_skin_ = kLeastSkin * distance;
+}
+
+// `apart(d)`: are the leaves certainly farther apart than d? False if they are not even beyond the margin.
+template <class Apart> bool Descent::parted(Apart&& apart) noexcept {
+    while (skin > 0) {
+        if (apart(options.margin + skin)) return true;
+        skin = skin > least_skin_ ? skin / 4 : 0;
+    }
+    return apart(options.margin);
+}
+
+bool Descent::take(const MeetingPair& pair) noexcept {
+    if (found < pairs.size()) pairs[found] = pair;
+    ++found;
+    return !all;
+}
+
+bool Descent::meet(uint32_t node_a, uint32_t node_b) noexcept {
+    const TriangleRange in_a = a.tree.triangles(node_a), in_b = b.tree.triangles(node_b);
+    if (in_a.count == 0 && in_b.count == 0)
+        return meets({node_a, node_b, kNoTriangle, kNoTriangle}) && take({node_a, node_b, kNoTriangle, kNoTriangle});
+    if (in_a.count == 0) {
+        for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
+            if (meets({node_a, node_b, kNoTriangle, t}) && take({node_a, node_b, kNoTriangle, t})) return true;
+        return false;
+    }
+    if (in_b.count == 0) {
+        for (uint32_t t = in_a.first; t < in_a.first + in_a.count; ++t)
+            if (meets({node_a, node_b, t, kNoTriangle}) && take({node_a, node_b, t, kNoTriangle})) return true;
+        return false;
+    }
+    LeafResult first;
+    const auto test = [&](TriangleRange some_a, TriangleRange some_b, float distance) {
+        first = test_leaves(a.tree, some_a, b.tree, some_b, b_to_a, distance);
+        stats.triangle_tests += first.pair_tests;
+        return !first.meet;
+    };
+    if (parted([&](float distance) { return test(in_a, in_b, distance); })) return false;
+    if (!all) return take({node_a, node_b, first.triangle_a, first.triangle_b});
+    for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
+        for (TriangleRange rest = in_a; rest.count > 0;) {
+            if (test(rest, {t, 1}, options.margin)) break;
+            take({node_a, node_b, first.triangle_a, t});
+            rest = {first.triangle_a + 1, in_a.first + in_a.count - (first.triangle_a + 1)};
+        }
+    return false;
+}
+
+bool Descent::meets(const MeetingPair& pair) noexcept {
+    const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
+    if (in_a || in_b) ++stats.triangle_tests;
+    return !parted([&](float distance) {
+        if (in_a && in_b)
+            return apart(place(a.tree, pair.triangle_a), place(b.tree, pair.triangle_b, b_to_a), distance);
+        const auto triangle_apart = [distance](const PlacedTriangle& x, const PlacedEllipsoid& y) {
+            return distance == 0 ? apart(x, y) : query::distance(x, y).lower > distance;
+        };
+        if (in_a) return triangle_apart(place(a.tree, pair.triangle_a), place(b.tree.ellipsoid(pair.node_b), b_to_a));
+        if (in_b) return triangle_apart(place(b.tree, pair.triangle_b, b_to_a), place(a.tree.ellipsoid(pair.node_a)));
+        const auto x = place(a.tree.ellipsoid(pair.node_a)), y = place(b.tree.ellipsoid(pair.node_b), b_to_a);
+        if (distance == 0) return test_pair(x, y).verdict == PairVerdict::separated;
+        return distance_of(x, y, kDistanceTolerance * (distance + x.size + y.size)).lower > distance;
+    });
+}
+
+} // namespace prolate::query

@@ -1,0 +1,159 @@
+// The culling tests of rays: one ray against the eight lanes of a block, in single precision. Per SIMD target; include
+// it below hwy/foreach_target.h. query/ray_lanes.cpp does the same operations on one lane in plain C++.
+//
+// A ray o + s E, s >= 0, and an ellipsoid {c + L u : |u| <= 1}, r = c - o: with ANY direction n,
+//     every common point has   s n.E >= g,   g = n.r - |L^T n|,                                                    (1)
+// so an inexact n costs decisions, never correctness.
+//
+// Rays along an axis k (inside.hpp) take n in the plane of the other two axes, i and j, where the ellipsoid's shadow
+// has the shape P = F F^T, F = rows i and j of L: n = adj(P) (r_i, r_j) decides exactly, and the line misses if g > 0.
+// The half lines are told apart by the axis itself: nothing lies ahead if r_k + |row k of L| < 0.
+//
+// General rays: seen from the ellipsoid as the unit ball, y = L^-1 (o - c), v = L^-1 E, the line comes nearest to the
+// center at s = -y.v / v.v, and enters sqrt((1 - nearest^2) / v.v) before. The point of entry if it is hit ahead, else
+// the nearest point of the half line, z = y + s v, s >= 0, gives n = -L^-T z, which decides exactly. With d = n.E the
+// ray, s <= limit, misses if g > max(0, limit d); else g / d, if d > 0, bounds the parameter of entry from below.
+//
+// Why single precision suffices: as in lanes-inl.hpp, u = 2^-24, in the lattice coordinates of the tree, where c and L
+// are exact. With o and E right within 2^-44 reach before they are rounded:
+//   r       |dr| <= u (|o| + |r|) + 2^-44 reach
+//   n.r     3 u |n| |r| + |n| |dr|
+//   |L^T n| 7 u |n| |L|
+//   s d     s <= 1: 5 u |n| |E| + 2^-44 |n| reach; the quotient g / d, or the product, u |n| |E| more
+//   g - s d two roundings more:  2 u |n| (|r| + |L| + |E|)
+// With |r| <= |o| + |c| the two sides of (1) are wrong by at most |n| (u (7 |o| + 6 |c| + 9 |L| + 8 |E|) + 2^-43 reach)
+// together, and g is taken kLaneMargin |n|_1 (|o|_1 + |c| + |L|_1 + |E|_1) + 2^-42 |n|_1 reach smaller: 32 u, more than
+// three times as much, which pays for the rounding of the bound itself. Underflow and NaN: as in lanes-inl.hpp.
+//
+// Cost: about 50 vector operations and a square root for an axis, 110 with 6 divisions and 2 square roots for a ray.
+#include "query/lanes-inl.hpp"
+#include "query/ray_lanes.hpp"
+
+#include <limits>
+
+// clang-format off
+#if defined(PROLATE_QUERY_RAY_LANES_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef PROLATE_QUERY_RAY_LANES_INL_HPP
+#undef PROLATE_QUERY_RAY_LANES_INL_HPP
+#else
+#define PROLATE_QUERY_RAY_LANES_INL_HPP
+#endif
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
+
+HWY_INLINE Lanes sum_of_products(Lanes x, Lanes y, Lanes z, Lanes w) {
+    return hn::Add(hn::Mul(x, y), hn::Mul(z, w));
+}
+
+/// Sum of the moduli of L's entries: bounds |L|.
+HWY_INLINE Lanes entry_sum(const LaneNodes& e) {
+    const Lanes diagonal = hn::Add(hn::Add(e.l11, e.l22), e.l33);
+    return hn::Add(diagonal, hn::Add(hn::Add(hn::Abs(e.l21), hn::Abs(e.l31)), hn::Abs(e.l32)));
+}
+
+/// Lanes that rays from `point` along an axis and its opposite may meet, as bits from lane `first` on; all others are
+/// set too.
+template <size_t kAxis> HWY_INLINE AxisMask axis_lanes(const LaneNodes& e, const LatticePoint& point, size_t first) {
+    const LaneTag d;
+    const auto set = [d](float value) { return hn::Set(d, value); };
+    const Lanes r[3] = {hn::Sub(e.x, set(point.position[0])), hn::Sub(e.y, set(point.position[1])),
+                        hn::Sub(e.z, set(point.position[2]))};
+    // P = {{a, b}, {b, c}}, scaled so that squares of n cannot overflow, and |row k|.
+    Lanes a, b, c, half;
+    if constexpr (kAxis == 0) {
+        a = sum_of_products(e.l21, e.l21, e.l22, e.l22), b = sum_of_products(e.l21, e.l31, e.l22, e.l32);
+        c = sum_of_squares(e.l31, e.l32, e.l33), half = e.l11;
+    } else if constexpr (kAxis == 1) {
+        a = sum_of_squares(e.l31, e.l32, e.l33), b = hn::Mul(e.l31, e.l11), c = hn::Mul(e.l11, e.l11);
+        half = hn::Sqrt(sum_of_products(e.l21, e.l21, e.l22, e.l22));
+    } else {
+        a = hn::Mul(e.l11, e.l11), b = hn::Mul(e.l11, e.l21), c = sum_of_products(e.l21, e.l21, e.l22, e.l22);
+        half = hn::Sqrt(sum_of_squares(e.l31, e.l32, e.l33));
+    }
+    const Lanes ri = r[(kAxis + 1) % 3], rj = r[(kAxis + 2) % 3], rk = r[kAxis];
+    const Lanes si = hn::Mul(ri, set(kAxisScale)), sj = hn::Mul(rj, set(kAxisScale));
+    const Lanes ni = minor(c, si, b, sj), nj = minor(a, sj, b, si);
+    Lanes square; // |F^T n|^2
+    if constexpr (kAxis == 0) {
+        square = sum_of_squares(sum_of_products(e.l21, ni, e.l31, nj), sum_of_products(e.l22, ni, e.l32, nj),
+                                hn::Mul(e.l33, nj));
+    } else if constexpr (kAxis == 1) {
+        square = sum_of_squares(sum_of_products(e.l31, ni, e.l11, nj), hn::Mul(e.l32, ni), hn::Mul(e.l33, ni));
+    } else {
+        const Lanes u = sum_of_products(e.l11, ni, e.l21, nj), v = hn::Mul(e.l22, nj);
+        square = sum_of_products(u, u, v, v);
+    }
+    const Lanes margin = hn::Add(set(point.slack), hn::Mul(set(kLaneMargin), entry_sum(e)));
+    const Lanes length = hn::Add(hn::Abs(ni), hn::Abs(nj));
+    const Lanes g = hn::Sub(hn::Sub(sum_of_products(ni, ri, nj, rj), hn::Sqrt(square)), hn::Mul(margin, length));
+    const auto misses = hn::And(hn::Gt(g, hn::Zero(d)), hn::Gt(length, set(kLaneDirection)));
+    const Lanes widened = hn::Add(half, margin);
+    const uint32_t line = ~bits_of(misses, first);
+    const uint32_t none_ahead = bits_of(hn::Lt(hn::Add(widened, rk), hn::Zero(d)), first);
+    const uint32_t none_behind = bits_of(hn::Lt(hn::Sub(widened, rk), hn::Zero(d)), first);
+    return {line & ~none_ahead, line & ~none_behind};
+}
+
+/// All eight lanes of a block.
+template <size_t kAxis>
+HWY_INLINE AxisMask axis_block(const std::byte* block, int32_t step_exponent, const LatticePoint& point) {
+    AxisMask mask{0xff, 0xff};
+    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(LaneTag())) {
+        const AxisMask part = axis_lanes<kAxis>(load_nodes(block, i, step_exponent), point, i);
+        mask.ahead &= part.ahead, mask.behind &= part.behind;
+    }
+    return mask;
+}
+
+/// Lower bounds of the parameters at which the ray enters the ellipsoids; infinite if certainly not before `limit`
+/// <= 1.
+HWY_INLINE Lanes entry_lanes(const LaneNodes& e, const LatticeRay& ray, Lanes limit) {
+    const LaneTag d;
+    const auto set = [d](float value) { return hn::Set(d, value); };
+    const Lanes zero = hn::Zero(d), one = set(1), ex = set(ray.span[0]), ey = set(ray.span[1]), ez = set(ray.span[2]);
+    const Lanes rx = hn::Sub(e.x, set(ray.origin[0])), ry = hn::Sub(e.y, set(ray.origin[1])),
+                rz = hn::Sub(e.z, set(ray.origin[2]));
+    // -y and v by forward substitution.
+    const Lanes i1 = hn::Div(one, e.l11), i2 = hn::Div(one, e.l22), i3 = hn::Div(one, e.l33);
+    const auto solve = [&](Lanes x, Lanes y, Lanes z, Lanes& u, Lanes& v, Lanes& w) {
+        u = hn::Mul(x, i1);
+        v = hn::Mul(hn::Sub(y, hn::Mul(e.l21, u)), i2);
+        w = hn::Mul(hn::Sub(hn::Sub(z, hn::Mul(e.l31, u)), hn::Mul(e.l32, v)), i3);
+    };
+    Lanes y1, y2, y3, v1, v2, v3;
+    solve(rx, ry, rz, y1, y2, y3);
+    solve(ex, ey, ez, v1, v2, v3);
+    // z: nearest point of the line, drawn back to where it enters, or to the origin. All are negative like y.
+    const Lanes vv = sum_of_squares(v1, v2, v3);
+    const Lanes nearest = hn::Div(dot(y1, y2, y3, v1, v2, v3), vv);
+    const Lanes m1 = hn::Sub(y1, hn::Mul(nearest, v1)), m2 = hn::Sub(y2, hn::Mul(nearest, v2)),
+                m3 = hn::Sub(y3, hn::Mul(nearest, v3));
+    const Lanes inside = hn::Max(hn::Sub(one, sum_of_squares(m1, m2, m3)), zero);
+    const Lanes back = hn::Sqrt(hn::Div(inside, vv));
+    const auto ahead = hn::Gt(nearest, back);
+    const Lanes z1 = hn::IfThenElse(ahead, hn::Add(m1, hn::Mul(back, v1)), y1),
+                z2 = hn::IfThenElse(ahead, hn::Add(m2, hn::Mul(back, v2)), y2),
+                z3 = hn::IfThenElse(ahead, hn::Add(m3, hn::Mul(back, v3)), y3);
+    // n = -L^-T z by back substitution, and (1).
+    const Lanes nz = hn::Mul(z3, i3);
+    const Lanes ny = hn::Mul(hn::Sub(z2, hn::Mul(e.l32, nz)), i2);
+    const Lanes nx = hn::Mul(hn::Sub(hn::Sub(z1, hn::Mul(e.l21, ny)), hn::Mul(e.l31, nz)), i1);
+    const Lanes width = hn::Sqrt(sum_of_squares(dot(e.l11, e.l21, e.l31, nx, ny, nz),
+                                                sum_of_products(e.l22, ny, e.l32, nz), hn::Mul(e.l33, nz)));
+    const Lanes length = hn::Add(hn::Add(hn::Abs(nx), hn::Abs(ny)), hn::Abs(nz));
+    const Lanes margin = hn::Add(set(ray.slack), hn::Mul(set(kLaneMargin), entry_sum(e)));
+    const Lanes g = hn::Sub(hn::Sub(dot(nx, ny, nz, rx, ry, rz), width), hn::Mul(margin, length));
+    const Lanes along = dot(nx, ny, nz, ex, ey, ez);
+    // Written so that a NaN gives 0, which claims nothing.
+    const auto sound = hn::Gt(length, set(kLaneDirection));
+    const auto positive = hn::And(sound, hn::Gt(g, zero));
+    const Lanes bound = hn::IfThenElse(hn::And(positive, hn::Gt(along, zero)), hn::Div(g, along), zero);
+    const auto misses = hn::And(positive, hn::Gt(g, hn::Mul(limit, along)));
+    return hn::IfThenElse(misses, set(std::numeric_limits<float>::infinity()), bound);
+}
+
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif // PROLATE_QUERY_RAY_LANES_INL_HPP

@@ -1,0 +1,98 @@
+#include "query/ray_lanes.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace prolate::query {
+namespace {
+
+float sum_of_squares(float x, float y, float z) {
+    return x * x + y * y + z * z;
+}
+float dot(float x, float y, float z, float u, float v, float w) {
+    return x * u + y * v + z * w;
+}
+
+float entry_sum(const LaneNode& e) {
+    return e.l11 + e.l22 + e.l33 + (std::abs(e.l21) + std::abs(e.l31) + std::abs(e.l32));
+}
+
+float slack_of(const float origin[3], const float span[3], double reach) {
+    float lengths = kLargestCenter;
+    for (size_t i = 0; i < 3; ++i) lengths += std::abs(origin[i]) + std::abs(span[i]);
+    return kLaneMargin * lengths + static_cast<float>(0x1p-42 * reach);
+}
+
+} // namespace
+
+LatticePoint lattice_point(const PlacedPoint& point, const LatticeInfo& lattice) noexcept {
+    const double per_step = std::ldexp(1.0, -lattice.step_exponent);
+    LatticePoint out{};
+    double reach = point.reach * per_step;
+    for (size_t i = 0; i < 3; ++i) {
+        const double origin = lattice.origin[i];
+        out.position[i] = static_cast<float>(point.position[static_cast<glm::length_t>(i)] * per_step - origin);
+        reach += std::abs(origin);
+    }
+    constexpr float kNoSpan[3] = {};
+    out.slack = slack_of(out.position, kNoSpan, reach);
+    return out;
+}
+
+LatticeRay lattice_ray(const double origin[3], const double span[3], double reach) noexcept {
+    LatticeRay out{};
+    for (size_t i = 0; i < 3; ++i)
+        out.origin[i] = static_cast<float>(origin[i]), out.span[i] = static_cast<float>(span[i]);
+    out.slack = slack_of(out.origin, out.span, reach);
+    return out;
+}
+
+AxisMask axis_mask(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticePoint& point,
+                   uint32_t axis) noexcept {
+    const LaneNode e = load_node(block, lane, step_exponent);
+    const float factor[3][3] = {{e.l11, 0, 0}, {e.l21, e.l22, 0}, {e.l31, e.l32, e.l33}}; // rows
+    float r[3];
+    for (size_t i = 0; i < 3; ++i) r[i] = e.center[i] - point.position[i];
+    const size_t i = (axis + 1) % 3, j = (axis + 2) % 3;
+    // Products with the zeros of the factor change nothing.
+    const auto row_product = [&](size_t p, size_t q) {
+        return dot(factor[p][0], factor[p][1], factor[p][2], factor[q][0], factor[q][1], factor[q][2]);
+    };
+    const float a = row_product(i, i), b = row_product(i, j), c = row_product(j, j);
+    const float si = r[i] * kAxisScale, sj = r[j] * kAxisScale;
+    const float ni = c * si - b * sj, nj = a * sj - b * si;
+    float along[3];
+    for (size_t k = 0; k < 3; ++k) along[k] = factor[i][k] * ni + factor[j][k] * nj;
+    const float margin = point.slack + kLaneMargin * entry_sum(e), length = std::abs(ni) + std::abs(nj);
+    const float width = std::sqrt(sum_of_squares(along[0], along[1], along[2]));
+    const float g = (ni * r[i] + nj * r[j]) - width - margin * length;
+    if (g > 0 && length > kLaneDirection) return {0, 0};
+    const float widened = std::sqrt(row_product(axis, axis)) + margin;
+    return {!(widened + r[axis] < 0), !(widened - r[axis] < 0)};
+}
+
+float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticeRay& ray,
+                float limit) noexcept {
+    const LaneNode e = load_node(block, lane, step_exponent);
+    const auto& s = ray.span;
+    const float rx = e.center[0] - ray.origin[0], ry = e.center[1] - ray.origin[1], rz = e.center[2] - ray.origin[2];
+    const float i1 = 1 / e.l11, i2 = 1 / e.l22, i3 = 1 / e.l33;
+    const float y1 = rx * i1, y2 = (ry - e.l21 * y1) * i2, y3 = (rz - e.l31 * y1 - e.l32 * y2) * i3;
+    const float v1 = s[0] * i1, v2 = (s[1] - e.l21 * v1) * i2, v3 = (s[2] - e.l31 * v1 - e.l32 * v2) * i3;
+    const float vv = sum_of_squares(v1, v2, v3), nearest = dot(y1, y2, y3, v1, v2, v3) / vv;
+    const float m1 = y1 - nearest * v1, m2 = y2 - nearest * v2, m3 = y3 - nearest * v3;
+    const float outside = sum_of_squares(m1, m2, m3), inside = 1 - outside > 0 ? 1 - outside : 0;
+    const float back = std::sqrt(inside / vv);
+    const bool ahead = nearest > back;
+    const float z1 = ahead ? m1 + back * v1 : y1, z2 = ahead ? m2 + back * v2 : y2, z3 = ahead ? m3 + back * v3 : y3;
+    const float nz = z3 * i3, ny = (z2 - e.l32 * nz) * i2, nx = (z1 - e.l21 * ny - e.l31 * nz) * i1;
+    const float width =
+        std::sqrt(sum_of_squares(dot(e.l11, e.l21, e.l31, nx, ny, nz), e.l22 * ny + e.l32 * nz, e.l33 * nz));
+    const float length = std::abs(nx) + std::abs(ny) + std::abs(nz), margin = ray.slack + kLaneMargin * entry_sum(e);
+    const float g = dot(nx, ny, nz, rx, ry, rz) - width - margin * length, along = dot(nx, ny, nz, s[0], s[1], s[2]);
+    if (!(length > kLaneDirection && g > 0)) return 0;
+    if (g > limit * along) return std::numeric_limits<float>::infinity();
+    return along > 0 ? g / along : 0;
+}
+
+} // namespace prolate::query
