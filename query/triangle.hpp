@@ -36,9 +36,10 @@ struct PlacedTriangle {
 PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept;                             // of body A
 PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose& b_to_a) noexcept; // of body B
 
-/// True only if they have no common point. The margin is a parameter only so that the tests can show that wrong ones
-/// are caught.
-bool apart(const PlacedTriangle& a, const PlacedTriangle& b, double margin = kSeparationMargin) noexcept;
+/// True only if they have no common point; triangles: only if they are more than `distance` >= 0 apart. The margin is a
+/// parameter only so that the tests can show that wrong ones are caught.
+bool apart(const PlacedTriangle& a, const PlacedTriangle& b, double distance = 0,
+           double margin = kSeparationMargin) noexcept;
 bool apart(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid,
            double margin = kSeparationMargin) noexcept;
 

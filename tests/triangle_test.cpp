@@ -1,10 +1,11 @@
 // Triangle tests and the point-in-solid test of the query: against exact integers, and against long double.
 #include "query/inside.hpp"
 #include "query/triangle.hpp"
-#include "src/format.hpp"
+#include "query/triangle_lanes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
+#include "tests/triangle_pairs.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,54 +20,29 @@ namespace {
 using query::PlacedTriangle;
 using scenes::Point;
 using scenes::Random;
+using namespace triangle_pairs;
 
-// A tree of one leaf with the given triangles.
-std::vector<std::byte> leaf_of(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles) {
-    BakeInfo info;
-    info.exact = true;
-    format::PackedNode node{.diagonal = {60000, 60000, 60000}, .exponent = 40};
-    node.triangle_count = static_cast<uint8_t>(triangles.size());
-    const format::PackedLevel root{{node}};
-    return format::encode(info, 2, {}, std::span(&root, 1), {vertices, triangles, 1});
-}
-
-using Corners = std::array<Vec3, 3>;
-
-struct Pair {
-    Corners a, b;
-    Pose pose_a, pose_b;
-};
-using Test = std::function<bool(const Pair&)>;
+using ApartTest = std::function<bool(const Pair&)>;
 
 // The shipped test, with the placement that a query uses.
 bool apart_with(double margin, const Pair& p) {
     const auto bytes_a = leaf_of({p.a.begin(), p.a.end()}, {{0, 1, 2}});
     const auto bytes_b = leaf_of({p.b.begin(), p.b.end()}, {{0, 1, 2}});
     const auto b_to_a = query::relative_pose(p.pose_a, p.pose_b);
-    return query::apart(query::place(*TreeView::open(bytes_a), 0), query::place(*TreeView::open(bytes_b), 0, b_to_a),
+    return query::apart(query::place(*TreeView::open(bytes_a), 0), query::place(*TreeView::open(bytes_b), 0, b_to_a), 0,
                         margin);
 }
 bool shipped(const Pair& p) {
     return apart_with(query::kSeparationMargin, p);
 }
 
-reference::Real distance(const Pair& p) {
-    return reference::distance(reference::placed(p.a, p.pose_a, p.pose_a.translation),
-                               reference::placed(p.b, p.pose_b, p.pose_a.translation));
-}
-// S of the error analysis.
-double size(const Pair& p) {
-    double largest[2] = {};
-    for (size_t i = 0; i < 3; ++i) {
-        const auto length = [](const Vec3& v) {
-            return std::sqrt(double{v.x} * v.x + double{v.y} * v.y + double{v.z} * v.z);
-        };
-        largest[0] = std::max(largest[0], length(p.a[i])), largest[1] = std::max(largest[1], length(p.b[i]));
-    }
-    const double d[3] = {double{p.pose_b.translation.x} - p.pose_a.translation.x,
-                         double{p.pose_b.translation.y} - p.pose_a.translation.y,
-                         double{p.pose_b.translation.z} - p.pose_a.translation.z};
-    return largest[0] + largest[1] + std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+// The same by way of the float kernels: a leaf of one triangle each.
+bool apart_in_lanes(const query::LaneMarginFactors& factors, const Pair& p) {
+    const auto bytes_a = leaf_of({p.a.begin(), p.a.end()}, {{0, 1, 2}});
+    const auto bytes_b = leaf_of({p.b.begin(), p.b.end()}, {{0, 1, 2}});
+    return !query::test_leaves(*TreeView::open(bytes_a), {0, 1}, *TreeView::open(bytes_b), {0, 1},
+                               query::relative_pose(p.pose_a, p.pose_b), 0, factors)
+                .meet;
 }
 
 // ---- small integers: touching and coplanar cases abound, and everything is exact ----
@@ -141,7 +117,7 @@ Corners to_floats(const IntTriangle& t) {
 }
 
 // Share of the pairs of integer triangles with corners below `range` that the test gets wrong.
-uint32_t wrong_among_integers(Int range, bool flat, uint32_t count, double margin, uint32_t& meeting) {
+uint32_t wrong_among_integers(Int range, bool flat, uint32_t count, const ApartTest& test, uint32_t& meeting) {
     Random random(static_cast<uint64_t>(range) * 2 + flat);
     const auto triangle = [&] {
         for (;;) {
@@ -157,92 +133,39 @@ uint32_t wrong_among_integers(Int range, bool flat, uint32_t count, double margi
         const IntTriangle a = triangle(), b = triangle();
         const bool truth = meet(a, b);
         meeting += truth;
-        wrong += apart_with(margin, {to_floats(a), to_floats(b), {}, {}}) == truth;
+        wrong += test({to_floats(a), to_floats(b), {}, {}}) == truth;
     }
     return wrong;
 }
 
 TEST(Triangles, AreExactOnIntegers) {
-    for (const Int range : {3, 5, 12})
-        for (const bool flat : {false, true}) {
-            uint32_t meeting = 0;
-            EXPECT_EQ(wrong_among_integers(range, flat, 30'000, query::kSeparationMargin, meeting), 0u) << range;
-            EXPECT_GT(meeting, 3'000u);
-            EXPECT_LT(meeting, 29'900u);
-        }
+    for (const ApartTest& test : {ApartTest(shipped), ApartTest([](const Pair& p) { return apart_in_lanes({}, p); })})
+        for (const Int range : {3, 5, 12})
+            for (const bool flat : {false, true}) {
+                uint32_t meeting = 0;
+                EXPECT_EQ(wrong_among_integers(range, flat, 20'000, test, meeting), 0u) << range;
+                EXPECT_GT(meeting, 2'000u);
+                EXPECT_LT(meeting, 19'900u);
+            }
 }
 TEST(Triangles, TheCheckAboveNoticesWrongMargins) {
-    uint32_t meeting = 0;
-    EXPECT_GT(wrong_among_integers(5, false, 3'000, -1e-12, meeting), 100u); // touching pairs
-    EXPECT_GT(wrong_among_integers(5, false, 3'000, 0.01, meeting), 10u);
+    const auto wrong = [](const ApartTest& test) {
+        uint32_t meeting = 0;
+        return wrong_among_integers(5, false, 3'000, test, meeting);
+    };
+    EXPECT_GT(wrong([](const Pair& p) { return apart_with(-1e-12, p); }), 100u); // touching pairs
+    EXPECT_GT(wrong([](const Pair& p) { return apart_with(0.01, p); }), 10u);
+    EXPECT_GT(wrong([](const Pair& p) { return apart_in_lanes({.direction = -1e-6f}, p); }), 100u);
 }
 
 // ---- any shape, place and pose, near contact ----
-
-struct Family {
-    const char* name;
-    double thinnest; // smallest height of a triangle over its length
-    double offset;   // of the triangles from their bodies' origins, in lengths
-    bool coplanar;
-};
-void PrintTo(const Family& family, std::ostream* out) {
-    *out << family.name;
-}
-
-Corners random_triangle(Random& random, const Family& family) {
-    const double length = random.log_in(0.1, 10), width = length * random.log_in(family.thinnest, 1);
-    const double slide = random.in(-0.5, 1.5);
-    const Point p[3] = {{0, 0, 0}, {length, 0, 0}, {slide * length, width, 0}};
-    const Quat turn = family.coplanar ? Quat{0, 0, static_cast<float>(random.in(-1, 1)), 1} : random.rotation();
-    const Point at = random.in_ball();
-    Corners out;
-    for (size_t i = 0; i < 3; ++i) {
-        Point q = scenes::rotate(turn, p[i]);
-        for (size_t k = 0; k < 3; ++k) q[k] += family.offset * at[k];
-        if (family.coplanar) q[2] = 0.25;
-        out[i] = scenes::to_float(q);
-    }
-    return out;
-}
-
-// A point of a corner, an edge or the face.
-Point feature_point(Random& random, const Corners& t) {
-    double w[3] = {random.unit(), random.unit(), random.unit()};
-    const uint32_t zero = random.below(3), kind = random.below(3);
-    if (kind < 2) w[zero] = 0;
-    if (kind < 1) w[(zero + 1) % 3] = 0;
-    const double sum = w[0] + w[1] + w[2];
-    Point out{};
-    for (size_t i = 0; i < 3; ++i) {
-        out[0] += w[i] / sum * double{t[i].x};
-        out[1] += w[i] / sum * double{t[i].y};
-        out[2] += w[i] / sum * double{t[i].z};
-    }
-    return out;
-}
-
-// Two triangles of which a point of one lies at a small distance from a point of the other.
-Pair near_contact(Random& random, const Family& family) {
-    Pair p{random_triangle(random, family), random_triangle(random, family), {}, {}};
-    const Point on_a = feature_point(random, p.a), on_b = feature_point(random, p.b);
-    Point way = random.direction();
-    if (family.coplanar)
-        way[2] = 0; // and no rotation, which would not be exact
-    else
-        p.pose_a.rotation = random.rotation(), p.pose_b.rotation = random.rotation();
-    const Point a = scenes::rotate(p.pose_a.rotation, on_a), b = scenes::rotate(p.pose_b.rotation, on_b);
-    const double gap = random.log_in(1e-9, 1);
-    p.pose_b.translation =
-        scenes::to_float({a[0] - b[0] + gap * way[0], a[1] - b[1] + gap * way[1], a[2] - b[2] + gap * way[2]});
-    return p;
-}
 
 struct Tally {
     uint32_t falsely_apart = 0, missed = 0, apart = 0;
 };
 constexpr double kDecided = 1e-9; // of S: farther triangles must be found apart
 
-Tally tally(const Family& family, uint32_t count, const Test& test) {
+Tally tally(const Family& family, uint32_t count, const ApartTest& test) {
     Random random(7);
     Tally out;
     for (uint32_t i = 0; i < count; ++i) {
@@ -271,10 +194,7 @@ TEST_P(TriangleFamily, TheHarnessNoticesWrongMargins) {
     EXPECT_GT(tally(GetParam(), 20'000, [](const Pair& p) { return apart_with(1e-4, p); }).missed, 0u);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, TriangleFamily,
-                         testing::Values(Family{"round", 0.3, 0, false}, Family{"slivers", 1e-6, 0, false},
-                                         Family{"far_from_the_origin", 0.1, 1e3, false},
-                                         Family{"coplanar", 0.01, 0, true}),
+INSTANTIATE_TEST_SUITE_P(All, TriangleFamily, testing::ValuesIn(kFamilies),
                          [](const auto& family) { return std::string(family.param.name); });
 
 TEST(Triangles, DegenerateOnesAreSegmentsAndPoints) {
@@ -354,9 +274,9 @@ int64_t winding(const Mesh& mesh, const query::PlacedPoint& p) {
         const size_t end = std::min(mesh.triangles.size(), begin + kMaxLeafTriangles);
         const auto at = [&](size_t i) { return mesh.triangles.begin() + static_cast<ptrdiff_t>(i); };
         const auto bytes = leaf_of(mesh.vertices, {at(begin), at(end)});
-        uint64_t tests = 0;
-        sum += *query::winding_number(*TreeView::open(bytes), p, tests, UINT64_MAX);
-        EXPECT_EQ(tests, 1u);
+        QueryStats stats;
+        sum += *query::winding_number(*TreeView::open(bytes), p, stats, UINT64_MAX);
+        EXPECT_EQ(stats.triangle_tests, end - begin);
     }
     return sum;
 }

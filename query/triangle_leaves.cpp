@@ -1,0 +1,26 @@
+#include "query/targets.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/triangle_leaves.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/triangle_leaves-inl.hpp"
+
+#if HWY_ONCE
+namespace prolate::query {
+
+HWY_EXPORT(test_rows);
+HWY_EXPORT(test_leaf_pair);
+
+LaneVerdicts test_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,
+                        const LaneMarginFactors& factors) noexcept {
+    return HWY_DYNAMIC_DISPATCH(test_rows)(a, b, margins, factors);
+}
+
+LeafResult test_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                       const RelativePose& b_to_a, double distance, const LaneMarginFactors& factors) noexcept {
+    return HWY_DYNAMIC_DISPATCH(test_leaf_pair)(a, in_a, b, in_b, b_to_a, distance, factors);
+}
+
+} // namespace prolate::query
+#endif
