@@ -1,0 +1,70 @@
+// One distance() query: what the vectorised search (distance.cpp) and the decisions at its leaves (distance_leaves.cpp)
+// share. Everything in the frame of body A, in metres.
+#pragma once
+
+#include "query/descent.hpp"
+#include "query/triangle_distance.hpp"
+
+#include <prolate/distance.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+namespace prolate::query {
+
+struct DistanceSearch {
+    Body a, b;
+    const RelativePose b_to_a;
+    const LatticePose lattice_b_to_a, lattice_a_to_b;
+    const DistanceOptions& options;
+    QueryContext::Entry* const entries;
+    QueryStats stats;
+
+    bool roots_meet = true;   ///< they may
+    bool complete = false;    ///< no budget ran out
+    bool overlapping = false; ///< the witness meets
+    /// Of all pairs of leaves: those decided are not nearer than `decided`, those ruled out than `skipped`, and those
+    /// still open, when a limit ended the search, than `open`.
+    double decided = kInfinity, skipped = kInfinity, open = kInfinity;
+    /// The nearest pair found, no farther apart than `upper`.
+    double upper = kInfinity;
+    MeetingPair witness;
+    glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0};
+    glm::dvec3 normal{0, 0, 0}; ///< unit, from on_a to on_b; 0 if they coincide or are not known
+
+    DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
+                   QueryContext& context, const DistanceOptions& distance_options) noexcept;
+
+    /// What is at least so far apart, > 0, need not be looked at: it cannot improve the answer by more than the
+    /// tolerance, nor meet.
+    double enough() const {
+        const double relative = std::max(options.tolerance_relative, kLeastTolerance);
+        const double improving = upper - std::max(options.tolerance_absolute, relative * upper);
+        const double limit = std::min(options.max_distance, improving); // improving may be NaN: inf - inf
+        return std::max(upper < kInfinity ? limit : options.max_distance, std::numeric_limits<double>::min());
+    }
+    double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
+
+    /// Decides on two leaves. Sets `overlapping` if they meet.
+    void decide(uint32_t node_a, uint32_t node_b) noexcept;
+    /// The same for what an earlier query found, which is not trusted to be of these trees.
+    void try_first(const MeetingPair& pair) noexcept;
+
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    static constexpr double kLeastTolerance = 1e-12;
+
+private:
+    void take(const TriangleDistance& found, const MeetingPair& pair, bool meet) noexcept;
+    void decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
+};
+
+/// Bound on the distance of the roots, from spheres around them, in double precision.
+double root_bound(const DistanceSearch& search) noexcept;
+
+/// The search itself: leaves every pair of leaves decided, skipped or open.
+void search(DistanceSearch& query) noexcept;
+
+} // namespace prolate::query

@@ -1,0 +1,48 @@
+// A heap of pairs of nodes in the caller's scratch, the least bound on top. Like std::push_heap, but with the same
+// order of equal bounds from every standard library, and four children a node: half the levels to walk down.
+#pragma once
+
+#include <prolate/query.hpp>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace prolate::query {
+
+class PairHeap {
+public:
+    using Entry = QueryContext::Entry;
+
+    explicit PairHeap(Entry* entries) : entries_(entries) {}
+    bool empty() const { return size_ == 0; }
+    uint32_t size() const { return size_; }
+    const Entry& top() const { return entries_[0]; }
+
+    void push(const Entry& entry) {
+        uint32_t at = size_++;
+        for (; at > 0 && entry.bound < entries_[(at - 1) / 4].bound; at = (at - 1) / 4)
+            entries_[at] = entries_[(at - 1) / 4];
+        entries_[at] = entry;
+    }
+    Entry pop() {
+        const Entry top = entries_[0], last = entries_[--size_];
+        uint32_t at = 0;
+        for (uint32_t child = 1; child < size_; child = 4 * at + 1) {
+            const uint32_t end = std::min(child + 4, size_);
+            uint32_t least = child;
+            for (uint32_t c = child + 1; c < end; ++c)
+                if (entries_[c].bound < entries_[least].bound) least = c;
+            if (!(entries_[least].bound < last.bound)) break;
+            entries_[at] = entries_[least];
+            at = least;
+        }
+        if (size_ > 0) entries_[at] = last;
+        return top;
+    }
+
+private:
+    Entry* const entries_;
+    uint32_t size_ = 0;
+};
+
+} // namespace prolate::query
