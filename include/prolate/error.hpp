@@ -18,6 +18,8 @@ enum class ErrorCode : uint8_t {
     cancelled = 6,     ///< the progress callback asked to stop
     unsupported = 7,   ///< a known word whose work this version does not do
     internal = 8,      ///< a promise of the library did not hold; please report it
+    out_of_memory = 9, ///< the memory resource gave no more; nothing has changed
+    bad_id = 10,       ///< an id that names nothing (any more)
 };
 
 /// A failure. `what` is static text in plain words; `where` is the byte offset, triangle index or option value
