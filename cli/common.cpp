@@ -36,6 +36,8 @@ int exit_code(ErrorCode code) {
     case ErrorCode::cancelled:
         return kInterrupted;
     case ErrorCode::internal:
+    case ErrorCode::out_of_memory:
+    case ErrorCode::bad_id:
         break;
     }
     return kInternal;
@@ -78,6 +80,8 @@ std::string_view advice_for(const Error& error) {
         return "please report this, with the input";
     case ErrorCode::unsupported: // says itself what to use
     case ErrorCode::cancelled:
+    case ErrorCode::out_of_memory: // these two come from worlds, which the command has none of
+    case ErrorCode::bad_id:
         break;
     }
     return "";

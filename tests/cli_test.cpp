@@ -17,6 +17,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <thread>
 #include <utility>
@@ -853,7 +854,7 @@ TEST_F(Cli, BadTreesAreRefusedByEveryCommand) {
 TEST_F(Cli, InfoTellsWhatIsThere) {
     const Outcome text = run({"info", shared("peanut.etree")});
     EXPECT_EQ(text.code, 0);
-    EXPECT_NE(text.out.find("in 3 levels, degree 4"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find("in 3 levels, degree 4; 6 blocks, "), std::string::npos) << text.out;
     const Json info = Json::parse(run({"info", shared("peanut.etree"), "--json"}).out);
     EXPECT_EQ(info["bytes"], fs::file_size(shared("peanut.etree")));
     EXPECT_EQ(info["asked"]["levels"], 2);
@@ -861,6 +862,9 @@ TEST_F(Cli, InfoTellsWhatIsThere) {
     const Json report = Json::parse(read(shared("report.json")));
     EXPECT_EQ(info["source_hash"], report["source_hash"]);
     EXPECT_EQ(info["nodes"], report["nodes"]);
+    EXPECT_EQ(info["bytes_per_node"], 256.0 * info["blocks"].get<double>() / info["nodes"].get<double>());
+    EXPECT_EQ(info["levels"][1]["first_node"], 8);
+    EXPECT_EQ(info["levels"][1]["blocks"], 1);
     for (size_t l = 0; l < 3; ++l)
         for (const auto& [key, value] : report["levels"][l].items())
             if (key != "seconds" && key != "nodes" && key != "bytes") {
@@ -953,6 +957,16 @@ TEST_F(Cli, ExportsJsonAndPly) {
     const Json json = Json::parse(read(file("a.json")));
     EXPECT_EQ(json["nodes"].size(), info["nodes"]);
     EXPECT_EQ(json["nodes"][0]["factor"].size(), 6u);
+    // Children are named as the nodes are: by slots, which have gaps.
+    std::set<uint32_t> names, children{0};
+    for (const Json& node : json["nodes"]) {
+        names.insert(node["node"].get<uint32_t>());
+        for (uint32_t i = 0; i < node["child_count"].get<uint32_t>(); ++i)
+            children.insert(node["first_child"].get<uint32_t>() + i);
+    }
+    EXPECT_EQ(names.size(), info["nodes"]);
+    EXPECT_EQ(names, children);
+    EXPECT_GT(*names.rbegin(), names.size());
 
     ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("a.PLY"), "--level", "1"}).code, 0);
     const auto mesh = load_mesh(file("a.PLY").c_str());

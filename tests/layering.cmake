@@ -22,9 +22,9 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|glm")
+set(query_headers "${core_headers}|query|collide|distance|pairs|bounds|jobs|world|glm")
 set(query_folders "src|query")
-set(query_libraries "glm/.*")
+set(query_libraries "glm/.*|hwy/.*")
 
 set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
@@ -38,6 +38,7 @@ set(cli_libraries
 # Single files that may have one library more: the gateways.
 set(extra_include/prolate/eigen.hpp "Eigen/.*")
 set(extra_include/prolate/glm.hpp "glm/.*")
+set(extra_include/prolate/tbb.hpp "oneapi/tbb/.*")
 set(extra_builder/import.cpp "assimp/.*")
 
 # allowed(OUT file layer form target): may `file` of `layer` include <target> (form "<") or "target" (form ")?

@@ -15,18 +15,18 @@ script_test(project.layering_selftest layering_selftest.cmake -D ROOT=${PROJECT_
 # Links.
 include(links.cmake)
 test_links(project.links_core prolate_core "Threads::Threads")
-test_links(project.links_query prolate_query "prolate::core|Threads::Threads")
+test_links(project.links_query prolate_query "prolate::core|hwy::hwy|Threads::Threads")
 add_library(links_planted INTERFACE)
 target_link_libraries(links_planted INTERFACE prolate::query $<BUILD_INTERFACE:Planted::Eigen>)
-test_links(project.links_selftest links_planted "prolate::core|prolate::query|Threads::Threads"
+test_links(project.links_selftest links_planted "prolate::core|prolate::query|hwy::hwy|Threads::Threads"
   PASS_REGULAR_EXPRESSION "links_planted may not link: Planted::Eigen")
 
-# Public headers. Two of them are gateways to a library; the others must do without.
+# Public headers. Three of them are gateways to a library; the others must do without.
 include(headers.cmake)
 file(GLOB public_headers RELATIVE ${PROJECT_SOURCE_DIR}/include/prolate CONFIGURE_DEPENDS
   ${PROJECT_SOURCE_DIR}/include/prolate/*)
 if(NOT PROLATE_BUILD_BUILDER)
-  list(REMOVE_ITEM public_headers eigen.hpp) # Eigen need not be there
+  list(REMOVE_ITEM public_headers eigen.hpp tbb.hpp) # Eigen and oneTBB need not be there
 endif()
 set(header_sources "")
 foreach(header IN LISTS public_headers)
