@@ -107,14 +107,15 @@ HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, F margin)
         hn::Gt(px + py + pz - e.a - e.b, (p.slack + margin) * length + set(7 * kV) * absolute + set(kUnderflow));
 
     const F error = set(4) * p.r1 + set(1 / (8 * kV)) * p.slack, room = e.det - set(32 * kV);
-    e.overlapping =
-        hn::And(hn::Le(e.mu * (e.a + p.a.slack * error), room), hn::Le(e.lambda * (e.b + p.b.slack * error), room));
+    e.overlapping = hn::And(hn::Le(e.mu * (e.a + set(kUnderflow) + p.a.slack * error), room),
+                            hn::Le(e.lambda * (e.b + set(kUnderflow) + p.b.slack * error), room));
     return e;
 }
 
 // The careful test.
 HWY_INLINE Mask overlapping(const Pairs& p, const Evaluation& e) {
-    return hn::And(hn::Le(e.mu * e.a, e.det * set(1 - 16 * kV)), hn::Le(radial_in_b(p, e.wa * e.mu, e.det), set(1)));
+    return hn::And(hn::Le(e.mu * (e.a + set(kUnderflow)), e.det * set(1 - 16 * kV)),
+                   hn::Le(radial_in_b(p, e.wa * e.mu, e.det), set(1)));
 }
 
 // Newton's step of separation.cpp, brought to one fraction: with c = rho b^2 and h = rho^2 w.adj(Q) w / det(Q), w = Q2

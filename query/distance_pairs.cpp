@@ -123,7 +123,7 @@ private:
         // Perram and Wertheim's rho alone, as long as there is neither a plane nor a common point.
         const Mask alone = hn::Eq(sigma_, set(0)), same_side = hn::Gt(g * sigma_, set(0));
         const F scale = mu * length;
-        const F ta = scale * a / det * set(1 + 16 * kV), tb = radial_in_b(p_, wa * scale, det);
+        const F ta = scale * (a + set(kUnderflow)) / det * set(1 + 16 * kV), tb = radial_in_b(p_, wa * scale, det);
         const Mask common = hn::And(alone, hn::And(hn::Le(ta, set(1)), hn::Le(tb, set(1))));
         const F depth = (ta - set(1)) / p_.a.thinness + (tb - set(1)) / p_.b.thinness;
         depth_ = choose(common, depth * set(1 - 16 * kV), depth_);

@@ -16,7 +16,8 @@ using glm::dmat3;
 using glm::dvec3;
 
 constexpr double kLargestStep = 1.8; // in logarithms of rho and sigma
-constexpr double kDeep = 0.7;        // scaled by this about their centers, the bodies would still touch
+constexpr double kSmallestLimit = 0.05;
+constexpr double kDeep = 0.7; // scaled by this about their centers, the bodies would still touch
 constexpr double kSmallestStep = 0x1p-50;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -70,7 +71,8 @@ public:
         }
         double low = 0, high = kInfinity; // bracket of Perram and Wertheim's rho, as long as no plane is found
         double best_rho = rho, best_sigma = sigma;
-        enum class Came { by_newton, half_way, by_substitution } came = Came::by_newton;
+        double limit = kLargestStep; // of Newton's steps: halved where they go too far, so that they learn
+        bool substituted = false;
         while (out_.evaluations < kMaxGapEvaluations && propose(rho, sigma)) {
             const Along x = along(direction_);
             if (out_.upper - out_.lower <= tolerance) return;
@@ -86,14 +88,14 @@ public:
                     if (!(std::abs(rho - before) > kSmallestStep * before)) return;
                 }
                 sigma = 0;
-            } else if (better && newton(x, rho, sigma)) {
-                came = Came::by_newton;
-            } else if (!better && came == Came::by_newton) { // too far
+            } else if (better && newton(x, rho, sigma, limit)) {
+                limit = std::min(2 * limit, kLargestStep), substituted = false;
+            } else if (!better && !substituted && limit > kSmallestLimit) { // too far: half-way back
                 rho = std::sqrt(rho * best_rho), sigma = std::sqrt(sigma * best_sigma);
-                came = Came::half_way;
-            } else if (better || came == Came::half_way) {
+                limit /= 2;
+            } else if (better || !substituted) {
                 rho = best_.a / best_.b, sigma = best_.a * best_.g;
-                came = Came::by_substitution;
+                limit = kLargestStep, substituted = true;
             } else {
                 return; // the substitution did not raise g: it has all its digits
             }
@@ -172,7 +174,7 @@ public:
 
     // Moves rho and sigma by a step of Newton's method on log(a / b / rho) and log(a g / sigma), from their values for
     // the direction x that they gave. Without a sign in common, sigma stays out: 0.
-    bool newton(const Along& x, double& rho, double& sigma) const {
+    bool newton(const Along& x, double& rho, double& sigma, double limit = kLargestStep) const {
         // dn = -M^-1 (Q2 n rho dlog(rho) + n sigma dlog(sigma)), up to length, which changes nothing.
         const double k = 1 / (det_ * tau_);
         const dvec3 by_rho = adjugate_ * x.qb * (-rho * k), by_sigma = adjugate_ * x.n * (-sigma * k);
@@ -193,8 +195,8 @@ public:
             if (x.g > 0) return false;
             log_rho = -f1 / j11, log_sigma = 0;
         }
-        log_rho = std::clamp(log_rho, -kLargestStep, kLargestStep);
-        log_sigma = std::clamp(log_sigma, -kLargestStep, kLargestStep);
+        log_rho = std::clamp(log_rho, -limit, limit);
+        log_sigma = std::clamp(log_sigma, -limit, limit);
         rho *= rough_exp(log_rho), sigma *= rough_exp(log_sigma);
         return std::isfinite(rho) && std::isfinite(sigma);
     }

@@ -9,6 +9,7 @@
 
 #include <prolate/build.hpp>
 #include <prolate/collide.hpp>
+#include <prolate/distance.hpp>
 #include <prolate/verify.hpp>
 
 #include <gtest/gtest.h>
@@ -425,6 +426,45 @@ TEST(ExactQuery, AMarginIsADistance) {
             }
     EXPECT_GT(within, 30u);
     EXPECT_GT(beyond, 30u);
+}
+
+TEST(ExactQuery, DistanceBoundsHoldTheTruth) {
+    const auto all = bodies();
+    scenes::Random random(12);
+    uint32_t near = 0, meeting = 0;
+    for (const Body& a : all)
+        for (const Body& b : all)
+            for (int i = 0; i < 20; ++i) {
+                const Query q = at(between(random), random.in(0.3, 0.95));
+                const TreeView ta = a.built.tree.view(), tb = b.built.tree.view();
+                QueryContext context;
+                const DistanceResult result = distance(ta, q.a, tb, q.b, context);
+                ASSERT_EQ(result.verdict, ask(a.built, b.built, q).verdict);
+                ASSERT_LE(result.lower, result.upper);
+                const DistanceResult other = distance(tb, q.b, ta, q.a, context);
+                ASSERT_TRUE(other.lower == result.lower && other.upper == result.upper);
+                if (result.verdict == Verdict::overlapping) {
+                    ASSERT_EQ(result.lower, 0);
+                    ++meeting;
+                    continue;
+                }
+                const auto least = static_cast<double>(Truth(a.mesh, b.mesh, q).least);
+                if (least > 0.99 * static_cast<double>(Truth::kFar)) {
+                    ASSERT_GE(result.upper, 0.99 * least);
+                    continue;
+                }
+                ASSERT_LE(result.lower, least + 1e-11);
+                ASSERT_GE(result.upper, least - 1e-11);
+                ASSERT_LE(result.upper - result.lower, 2e-6 * result.upper + 1e-9);
+                for (const uint64_t budget : {1, 10, 100}) { // anytime
+                    const DistanceResult cut = distance(ta, q.a, tb, q.b, context, {.max_pair_tests = budget});
+                    ASSERT_TRUE(cut.lower <= least + 1e-11 && cut.upper >= least - 1e-11);
+                    ASSERT_LE(cut.stats.pair_tests, budget);
+                }
+                ++near;
+            }
+    EXPECT_GT(near, 10u);
+    EXPECT_GT(meeting, 100u);
 }
 
 TEST(ExactQuery, AllPairsAreFoundAndCounted) {
