@@ -84,7 +84,7 @@ TEST_P(ExactTreeOf, HoldsEveryTriangleInOneLeafAndAllEllipsoidsAbove) {
             expected.insert(positions([&](uint32_t v) { return clean.mesh.vertices[v]; }, t));
         std::vector<uint32_t> parent(tree.slot_count());
         uint32_t triangles = 0;
-        tree.for_each_node([&](uint32_t n) {
+        tree.for_each_node([&, leaf = leaf](uint32_t n) { // clang cannot capture a binding by reference
             const ChildRange children = tree.children(n);
             EXPECT_NE(children.count, 1u);
             for (uint32_t c = 0; c < children.count; ++c) parent[children.first + c] = n;
