@@ -23,8 +23,8 @@ int main(int argc, char** argv) {
     std::vector<prolate::BodyId> ids;
     std::vector<prolate::Pose> poses;
     for (int i = 0; i < std::atoi(argv[2]); ++i) {
-        const float x = static_cast<float>(i % 10), y = static_cast<float>(i / 10 % 10),
-                    z = static_cast<float>(i / 100);
+        const int layer = i / 100, row = i / 10 % 10;
+        const auto x = static_cast<float>(i % 10), y = static_cast<float>(row), z = static_cast<float>(layer);
         poses.push_back({{pitch * x, pitch * y, pitch * z}, {x, y, z, 5}});
         const auto id = world->insert({.tree = tree->view(), .pose = poses.back()});
         if (!id) return fail(id.error());
