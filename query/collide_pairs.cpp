@@ -170,7 +170,7 @@ private:
         stats_.evaluations += count - static_cast<uint32_t>(std::popcount(left));
         float rhos[8];
         uint32_t done = 0;
-        if (2 * static_cast<uint32_t>(std::popcount(left)) > width()) done = stay(p, e, left, separated, rhos);
+        if (2 * static_cast<size_t>(std::popcount(left)) > width()) done = stay(p, e, left, separated, rhos);
         for (size_t i = 0; i < count; ++i)
             verdicts_[first + i] = static_cast<Verdict>(~separated >> i & 1); // separated or overlapping
         for (; left != 0; left &= left - 1) {
@@ -188,7 +188,7 @@ private:
         for (uint32_t done = 1;; ++done) {
             left &= ~bits(overlapping(p, e));
             rho = next(p, e, rho);
-            if (2 * static_cast<uint32_t>(std::popcount(left)) <= width() || done == kMaxLaneEvaluations) {
+            if (2 * static_cast<size_t>(std::popcount(left)) <= width() || done == kMaxLaneEvaluations) {
                 hn::StoreU(rho, Lanes(), rhos);
                 return done;
             }

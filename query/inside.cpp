@@ -101,7 +101,7 @@ private:
             family.mask &= family.mask - 1;
             const std::byte* const block = tree_.block(family.block);
             const uint32_t count = load_le<uint8_t>(block + kBlockCount + lane);
-            const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+            const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
             if (count >= kTriangleLeaf) {
                 winding_ += crossings_of({first, count - kTriangleLeaf}, start.direction);
                 continue;

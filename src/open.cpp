@@ -174,7 +174,7 @@ private:
         children_ += children;
         next_child_block_ += blocks_for(children);
         next_triangle_ += triangles;
-        const int exponent = load_le<int8_t>(from + at_size);
+        const auto exponent = load_le<int8_t>(from + at_size);
         if (exponent < format::kMinNodeExponent || exponent > format::kMaxNodeExponent)
             return bad("node size out of range", block + at_size);
         for (size_t i = 0; i < 3; ++i)
