@@ -1,21 +1,30 @@
-// Exact trees, top-down over triangles.
+// Exact trees: a binary tree over the triangles, then the best wide one that can be cut out of it.
 //
-// A node's triangles are split in two again and again, each time the part of the largest cost, until there are `degree`
-// parts or all are small enough for a leaf. A split goes through the order of the boxes' centers along an axis, world
-// or principal, where it makes the sum of costs least:
+// The binary tree goes down to single triangles. A part is split in two through the order of the boxes' centers along
+// an axis, world or principal, where it makes the sum of costs least:
 //
 //     cost = n w^2,   w = mean width of the part in the 3 directions of the axes and the 6 of their face diagonals
 //
 // The chance that another body meets a convex one grows with its surface (the surface area heuristic, Goldsmith and
-// Salmon 1987), and a nearly round body's surface with its mean width squared; running widths cost nothing. Pair tests
-// of near-contact queries, mean of horse-horse / homer-homer / bunny-horse / knight-knight: 356 / 313 / 393 / 197,
-// against 387 / 386 / 452 / 290 with w^2 = sqrt(sum of the 2x2 minors of the covariance), 382 / 327 / 420 / 226 with
-// the surface of the box; other sets of directions and powers of n were no better.
+// Salmon 1987), and a nearly round body's surface with its mean width squared; running widths cost nothing.
+//
+// Which binary nodes become nodes of the tree is then chosen at once for the whole tree, by dynamic programming
+// (Ylitie, Karras and Laine 2017, section 3.1): the sum of w^2 over the inner nodes, each of which costs a query one
+// test of a block of children, plus kTriangleCost n w^2 over the leaves. So no lane of a block stays empty while a
+// sibling could be cut smaller, and leaves hold several triangles only where testing them costs less than another
+// block.
+//
+// What a query of horse-horse / homer-homer / bunny-horse / knight-knight costs near contact, blocks tested + triangle
+// pairs / 3, is 43 / 49 / 46 / 47; with the parts opened by largest cost until a node is full or they fit leaves of 4,
+// it was 48 / 60 / 53 / 69, in 8085 blocks for the horse against 10853. Other measures for w^2 made it no better:
+// surface of the box, other powers and directions, covariances, and the surface of ellipsoids fitted to each candidate
+// (2 % better for three times the time); nor does moving subtrees within the binary tree (3 %).
 //
 // Each node gets a minimum-volume ellipsoid around the corners of its triangles: fitted to their farthest points in the
 // sketch directions (merged from the children's), then refitted with what sticks out.
 //
-// Complexity: O(n log n) time, O(n) memory. Sorted projections below kSortedBelow triangles, bins above.
+// Complexity: O(n log n) time, O(n) memory for a fixed degree. Sorted projections below kSortedBelow triangles, bins
+// above. At most 2^31 triangles: the binary tree has no more levels than the file may have.
 #include "builder/exact.hpp"
 
 #include "builder/cover.hpp"
@@ -24,10 +33,10 @@
 #include "src/symmetric3.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -41,6 +50,7 @@ namespace {
 constexpr uint32_t kSortedBelow = 2048; // triangles of a part; above, bins find the split
 constexpr uint32_t kBins = 256;
 constexpr uint32_t kParallelAbove = 512; // triangles of a node whose children are worth tasks of their own
+constexpr double kTriangleCost = 0.5;    // of a query at a leaf, for each triangle; in tests of a block of children
 constexpr int kRounds = 6;               // of refitting a node
 constexpr double kOutside = 1 + 2e-3;    // squared radial coordinate from which a point calls for a refit
 
@@ -60,22 +70,39 @@ struct Extents {
             low[d] = std::min(low[d], e.low[d]), high[d] = std::max(high[d], e.high[d]);
     }
     Vec center() const { return {0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])}; }
-    double cost(uint32_t triangles) const {
+    double squared_width() const {
         double straight = 0, diagonal = 0;
         for (size_t d = 0; d < kDirections; ++d) (d < 3 ? straight : diagonal) += double{high[d]} - low[d];
         const double width = straight + std::numbers::sqrt2 / 2 * diagonal;
-        return triangles * width * width;
+        return width * width;
     }
 };
 
 struct Part {
     uint32_t begin, end; // of Grower::order_
-    double cost;
     uint32_t size() const { return end - begin; }
 };
 
+// Of the binary tree, depth first: the left child is the next, the right child comes after the 2 left - 1 nodes below
+// and with the left one. So subtrees can be made in parallel, and children come after their parents.
+struct Halves {
+    Part part;
+    uint32_t left = 0;        // triangles in the left child; 0 for a single triangle
+    double squared_width = 0; // in terms of Extents
+    // If it becomes an inner node, the lanes that its children take, and how many of them stem from the left child.
+    // No lanes: it becomes a leaf.
+    uint8_t lanes = 0, left_lanes = 0;
+    size_t choices = 0; // first of its Choices
+};
+
+// The best way to make siblings of a binary node's triangles, in at most as many lanes as the choice's place, from 1.
+struct Choice {
+    double cost = HUGE_VAL;
+    uint8_t left_lanes = 0; // for what is left of the cut; 0: best in one lane less
+};
+
 struct Node {
-    uint32_t begin = 0, end = 0;
+    uint32_t binary = 0; // index of its Halves
     std::vector<Node> children;
     format::PackedNode packed;
 };
@@ -87,6 +114,17 @@ struct Cut {
 };
 
 using Key = std::pair<double, uint32_t>; // height of a triangle and its index: a total order
+
+// A sketch of few points names each of them many times, and fitting takes time for each.
+std::vector<Vec> without_repeats(std::span<const Vec> points) {
+    std::vector<Vec> out(points.begin(), points.end());
+    const auto less = [](const Vec& p, const Vec& q) {
+        return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
+    };
+    std::sort(out.begin(), out.end(), less);
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    return out;
+}
 
 class Grower {
 public:
@@ -104,9 +142,14 @@ public:
     }
 
     Result<ExactTree> run() {
-        Node root{0, count_, {}, {}};
+        binary_.resize(2 * size_t{count_} - 1);
+        split(0, {0, count_}, kMaxLevels - 1);
+        Node root;
         Sketch sketch;
-        grow(root, kMaxLevels - 1, sketch);
+        if (!cancelled_) {
+            choose();
+            grow(root, sketch);
+        }
         if (cancelled_) return Error{ErrorCode::cancelled, "cancelled", 0};
         if (too_large_)
             return Error{ErrorCode::bad_mesh,
@@ -125,12 +168,6 @@ private:
         }
         return out;
     }
-    Part part(uint32_t begin, uint32_t end) const {
-        Extents all;
-        for (uint32_t i = begin; i < end; ++i) all.add(extents_[order_[i]]);
-        return {begin, end, all.cost(end - begin)};
-    }
-
     // The best cut between consecutive groups of triangles.
     struct Group {
         Extents extents;
@@ -145,13 +182,13 @@ private:
         };
         for (size_t g = groups.size(); g-- > 0;) {
             take(groups[g]);
-            right[g] = side.extents.cost(side.triangles);
+            right[g] = side.triangles * side.extents.squared_width();
         }
         Cut best;
         side = {};
         for (size_t g = 0; g + 1 < groups.size(); ++g) {
             take(groups[g]);
-            const double cost = side.extents.cost(side.triangles) + right[g + 1];
+            const double cost = side.triangles * side.extents.squared_width() + right[g + 1];
             if (cost < best.cost) best = {cost, side.triangles};
         }
         return best;
@@ -195,24 +232,25 @@ private:
                 Vec(axes[0][2], axes[1][2], axes[2][2])};
     }
 
-    // Cuts a part in two where it pays most, or into halves across its longest axis.
-    std::pair<Part, Part> cut(const Part& p, bool halves) {
+    // Cuts a part, of 2 triangles or more, in two where it pays most, but leaves neither side with more than `most`
+    // triangles: else in halves across its longest axis. Orders the triangles accordingly; returns how many are left.
+    uint32_t cut(const Part& p, uint64_t most) {
+        if (p.size() == 2) return 1;
         const auto [first, second, third] = principal_axes(p);
         const std::array<Vec, 6> axes{first, second, third, Vec::UnitX(), Vec::UnitY(), Vec::UnitZ()};
-        std::array<Cut, 6> cuts; // the default: none
+        std::array<Cut, 6> cuts;
         const auto try_axis = [&](size_t a) {
             cuts[a] = p.size() > kSortedBelow ? cut_binned(p, axes[a]) : cut_sorted(p, axes[a]);
         };
-        if (!halves) {
-            if (p.size() > kSortedBelow)
-                tbb::parallel_for(size_t{0}, cuts.size(), try_axis);
-            else
-                for (size_t a = 0; a < cuts.size(); ++a) try_axis(a);
-        }
+        if (p.size() > kSortedBelow)
+            tbb::parallel_for(size_t{0}, cuts.size(), try_axis);
+        else
+            for (size_t a = 0; a < cuts.size(); ++a) try_axis(a);
         const auto cheaper = [](const Cut& x, const Cut& y) { return x.cost < y.cost; };
-        const auto best = std::min_element(cuts.begin(), cuts.end(), cheaper); // the first of equals
-        const Vec axis = axes[static_cast<size_t>(best - cuts.begin())];
-        const uint32_t left = best->left > 0 ? best->left : p.size() / 2;
+        const auto cheapest = std::min_element(cuts.begin(), cuts.end(), cheaper); // the first of equals
+        Vec axis = axes[static_cast<size_t>(cheapest - cuts.begin())];
+        uint32_t left = cheapest->left;
+        if (left == 0 || std::max(left, p.size() - left) > most) axis = first, left = p.size() / 2;
 
         std::vector<Key> all = keys(p, axis);
         const auto middle = all.begin() + left;
@@ -222,58 +260,113 @@ private:
         std::stable_partition(order_.begin() + p.begin, order_.begin() + p.end, [&](uint32_t triangle) {
             return Key(axis.dot(extents_[triangle].center()), triangle) < first_right;
         });
-        return {part(p.begin, p.begin + left), part(p.begin + left, p.end)};
+        return left;
     }
 
-    // Triangles that fit below a node with so many levels beneath it, if parts are halved only.
-    uint64_t capacity(uint32_t levels) const {
-        const uint32_t doublings = levels * static_cast<uint32_t>(std::bit_width(options_.degree) - 1);
-        return doublings >= 32 ? UINT64_MAX : uint64_t{options_.leaf_triangles} << doublings;
-    }
-
-    std::vector<Part> divide(const Part& whole, uint32_t levels, bool halves) {
-        std::vector<Part> parts{whole};
-        while (parts.size() < options_.degree) {
-            size_t chosen = parts.size();
-            for (size_t i = 0; i < parts.size(); ++i) {
-                if (parts[i].size() <= options_.leaf_triangles) continue;
-                if (chosen == parts.size() ||
-                    (halves ? parts[i].size() > parts[chosen].size() : parts[i].cost > parts[chosen].cost))
-                    chosen = i;
-            }
-            if (chosen == parts.size()) break;
-            const auto [left, right] = cut(parts[chosen], halves);
-            parts[chosen] = left;
-            parts.insert(parts.begin() + static_cast<ptrdiff_t>(chosen) + 1, right);
+    // Makes binary_[index] of the part and all below it, in at most so many levels; returns the part's extents.
+    Extents split(uint32_t index, const Part& p, uint32_t levels) {
+        Halves& node = binary_[index];
+        node.part = p;
+        if (cancelled_) return {};
+        Extents all;
+        if (p.size() == 1) {
+            all = extents_[order_[p.begin]];
+            report(1);
+        } else {
+            node.left = cut(p, uint64_t{1} << (levels - 1));
+            const uint32_t middle = p.begin + node.left;
+            Extents right;
+            const auto make_left = [&] { all = split(left_of(index), {p.begin, middle}, levels - 1); };
+            const auto make_right = [&] { right = split(right_of(index), {middle, p.end}, levels - 1); };
+            if (p.size() > kParallelAbove)
+                tbb::parallel_invoke(make_left, make_right);
+            else
+                make_left(), make_right();
+            all.add(right);
         }
-        const auto too_deep = [&](const Part& p) { return p.size() > capacity(levels - 1); };
-        if (!halves && std::any_of(parts.begin(), parts.end(), too_deep)) return divide(whole, levels, true);
-        return parts;
+        node.squared_width = all.squared_width();
+        return all;
+    }
+    static uint32_t left_of(uint32_t index) { return index + 1; }
+    uint32_t right_of(uint32_t index) const { return index + 2 * binary_[index].left; }
+
+    // ---- from the binary tree to the wide one ----
+
+    uint32_t most_lanes(uint32_t index) const { return std::min(options_.degree, binary_[index].part.size()); }
+
+    // Finds out for each binary node what would become of it, children first.
+    void choose() {
+        size_t total = 0;
+        for (uint32_t i = 0; i < binary_.size(); ++i) {
+            binary_[i].choices = total;
+            total += most_lanes(i);
+        }
+        choices_.resize(total);
+        for (auto i = static_cast<uint32_t>(binary_.size()); i-- > 0;) {
+            Halves& node = binary_[i];
+            Choice* const choices = &choices_[node.choices];
+            const uint32_t size = node.part.size();
+            if (size <= options_.leaf_triangles) choices[0].cost = kTriangleCost * size * node.squared_width;
+            if (size == 1) continue;
+
+            const uint32_t lanes = most_lanes(i), left_most = most_lanes(left_of(i)),
+                           right_most = most_lanes(right_of(i));
+            const Choice* const left = &choices_[binary_[left_of(i)].choices];
+            const Choice* const right = &choices_[binary_[right_of(i)].choices];
+            Choice best;
+            for (uint32_t l = 1; l <= left_most; ++l)
+                for (uint32_t r = 1; r <= right_most && l + r <= lanes; ++r) {
+                    const Choice both{left[l - 1].cost + right[r - 1].cost, static_cast<uint8_t>(l)};
+                    if (both.cost < choices[l + r - 1].cost) choices[l + r - 1] = both;
+                    if (both.cost < best.cost) best = both, node.lanes = static_cast<uint8_t>(l + r);
+                }
+            node.left_lanes = best.left_lanes;
+            if (const double open = node.squared_width + best.cost; open < choices[0].cost)
+                choices[0].cost = open;
+            else
+                node.lanes = 0;
+            for (uint32_t n = 1; n < lanes; ++n)
+                if (!(choices[n].cost < choices[n - 1].cost)) choices[n] = {choices[n - 1].cost, 0};
+        }
+    }
+    // Adds the siblings that stand for a binary node in at most `lanes` lanes.
+    void add_siblings(std::vector<Node>& siblings, uint32_t index, uint32_t lanes) const {
+        const Choice* const choices = &choices_[binary_[index].choices];
+        while (lanes > 1 && choices[lanes - 1].left_lanes == 0) --lanes;
+        if (lanes == 1) {
+            siblings.push_back({index, {}, {}});
+            return;
+        }
+        const uint32_t left = choices[lanes - 1].left_lanes;
+        add_siblings(siblings, left_of(index), left);
+        add_siblings(siblings, right_of(index), lanes - left);
     }
 
     // ---- nodes ----
 
     template <class Visit> void for_each_corner(const Node& node, Visit&& visit) const {
-        for (uint32_t i = node.begin; i < node.end; ++i)
+        const Part& part = binary_[node.binary].part;
+        for (uint32_t i = part.begin; i < part.end; ++i)
             for (const uint32_t v : mesh_.triangles[order_[i]]) visit(to_vec(mesh_.vertices[v]));
     }
 
-    // Makes all below `node`, which may have `levels` levels beneath it, and `sketch` that of its corners.
-    void grow(Node& node, uint32_t levels, Sketch& sketch) {
+    // Makes all below `node`, and `sketch` that of its corners.
+    void grow(Node& node, Sketch& sketch) {
         if (cancelled_) return;
-        const uint32_t size = node.end - node.begin;
-        if (size <= options_.leaf_triangles) {
+        const Halves& halves = binary_[node.binary];
+        const uint32_t size = halves.part.size();
+        if (halves.lanes == 0) {
             node.packed.triangle_count = static_cast<uint8_t>(size);
             std::vector<Vec> corners;
             for_each_corner(node, [&](const Vec& p) { corners.push_back(p); });
             sketch.add(corners);
             report(size);
         } else {
-            for (const Part& p : divide(part(node.begin, node.end), levels, false))
-                node.children.push_back({p.begin, p.end, {}, {}});
+            add_siblings(node.children, left_of(node.binary), halves.left_lanes);
+            add_siblings(node.children, right_of(node.binary), uint32_t{halves.lanes} - halves.left_lanes);
             node.packed.child_count = static_cast<uint8_t>(node.children.size());
             std::vector<Sketch> sketches(node.children.size());
-            const auto grow_child = [&](size_t c) { grow(node.children[c], levels - 1, sketches[c]); };
+            const auto grow_child = [&](size_t c) { grow(node.children[c], sketches[c]); };
             if (size > kParallelAbove)
                 tbb::parallel_for(size_t{0}, sketches.size(), grow_child);
             else
@@ -286,7 +379,7 @@ private:
 
     // The node's ellipsoid.
     void cover(Node& node, const Sketch& sketch) {
-        std::vector<Vec> core(sketch.points().begin(), sketch.points().end());
+        std::vector<Vec> core = without_repeats(sketch.points());
         Fit fit;
         for (int round = 0; round < kRounds; ++round) {
             fit = enclosing_ellipsoid(core, options_.min_radius);
@@ -322,11 +415,12 @@ private:
         for (int i = 0; i < 3; ++i) node.packed.box_low[i] = box.low[i], node.packed.box_high[i] = box.high[i];
     }
 
+    // Each triangle is reported twice: when the binary tree has come down to it, and when its leaf is made.
     void report(uint32_t triangles) {
-        const uint32_t before = done_.fetch_add(triangles), step = count_ / 128 + 1;
+        const uint64_t before = done_.fetch_add(triangles), step = count_ / 64 + 1;
         if (!options_.progress || before / step == (before + triangles) / step) return;
         const std::lock_guard lock(reporting_);
-        if (!options_.progress(static_cast<double>(before + triangles) / count_)) cancelled_ = true;
+        if (!options_.progress(static_cast<double>(before + triangles) / (2.0 * count_))) cancelled_ = true;
     }
 
     // ---- the file's order ----
@@ -340,7 +434,8 @@ private:
             for (const Node* node : level) {
                 out.levels.back().nodes.push_back(node->packed);
                 for (const Node& child : node->children) next.push_back(&child);
-                for (uint32_t i = node->begin; node->children.empty() && i < node->end; ++i)
+                const Part& part = binary_[node->binary].part;
+                for (uint32_t i = part.begin; node->children.empty() && i < part.end; ++i)
                     out.triangles.push_back(mesh_.triangles[order_[i]]);
             }
             level.swap(next);
@@ -382,9 +477,11 @@ private:
     format::Lattice lattice_;
     std::vector<Extents> extents_; // of each triangle
     std::vector<uint32_t> order_;  // triangles; a node's are consecutive
+    std::vector<Halves> binary_;
+    std::vector<Choice> choices_; // of the binary nodes, most_lanes() for each
 
     std::atomic<bool> cancelled_ = false, too_large_ = false;
-    std::atomic<uint32_t> done_ = 0;
+    std::atomic<uint64_t> done_ = 0;
     std::mutex reporting_;
 };
 

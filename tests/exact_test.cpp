@@ -157,6 +157,43 @@ TEST(ExactTree, SameBytesForAnyNumberOfThreads) {
     }
 }
 
+// Queries test all children of a node in one go: no lane may stay empty while a child could still be divided.
+TEST(ExactTree, FillsItsNodes) {
+    for (const Mesh& mesh : {shapes::icosphere(3), shapes::torus(1, 0.3f, 37, 19)})
+        for (const uint32_t degree : {2u, 5u, 8u, 64u}) {
+            BuildOptions options;
+            options.degree = degree;
+            const Build built = must_build(mesh, options);
+            const TreeView tree = built.tree.view();
+            std::vector<uint32_t> nodes, below(tree.slot_count()); // triangles
+            tree.for_each_node([&](uint32_t n) { nodes.push_back(n); });
+            for (size_t i = nodes.size(); i-- > 0;) { // children come after their parents
+                const uint32_t n = nodes[i];
+                const ChildRange children = tree.children(n);
+                below[n] = tree.triangles(n).count;
+                for (uint32_t c = 0; c < children.count; ++c) below[n] += below[children.first + c];
+                EXPECT_EQ(children.count, tree.is_leaf(n) ? 0 : std::min(degree, below[n])) << degree;
+            }
+        }
+}
+
+uint32_t inner_nodes(const TreeView& tree) {
+    uint32_t count = 0;
+    tree.for_each_node([&](uint32_t n) { count += !tree.is_leaf(n); });
+    return count;
+}
+
+TEST(ExactTree, LeavesHoldSeveralTrianglesWhereThatIsCheaper) {
+    const auto torus = [](float scale) { return shapes::moved(shapes::torus(1, 0.3f, 96, 48), {}, scale); };
+    const Build built = must_build(torus(1));
+    const uint32_t inner = inner_nodes(built.tree.view());
+    // So many full nodes of 8 would lead down to single triangles.
+    EXPECT_LT(inner, (built.tree.view().triangle_count() - 1) / 7);
+    // The squares of other scales' widths are beyond a float: still the same tree, up to rounding.
+    for (const float scale : {1e-25f, 1e20f})
+        EXPECT_NEAR(inner_nodes(must_build(torus(scale)).tree.view()), inner, 0.02 * inner) << scale;
+}
+
 TEST(ExactTree, EndsWhereTheFormatDoes) {
     BuildOptions options;
     options.degree = 2, options.leaf_triangles = 1;
