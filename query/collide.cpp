@@ -44,7 +44,9 @@ public:
         // The roots, as if they were the only children of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         const bool leaf_a = is_leaf(d_.a, 0);
-        test<true>(d_.b, d_.a.tree.block(0), 0, 1, d_.lattice_a_to_b, 0, leaf_a);
+        Placed& root = placed_[true];
+        root = {place_here(d_.a.tree.block(0), 0, d_.lattice_a_to_b), 0};
+        test<true>(d_.b, 0, 1, root.single, 0, leaf_a);
         d_.roots_meet = size_ > 0;
         while (size_ > 0) {
             const auto e = stack_[--size_];
@@ -70,50 +72,47 @@ private:
     static bool is_leaf(const Body& body, uint32_t node) { return body.tree.is_leaf(node); }
     uint64_t budget() const { return d_.options.max_pair_tests - d_.stats.pair_tests; }
 
-    // Tests the children of `node` against `other`, which is one of the other tree; false if the budget is too small.
+    // Tests the children of `node`, which has some, against `other`, which is one of the other tree; false if the budget
+    // is too small.
     template <bool kB>
     bool open(Body& body, uint32_t node, const Body& other_body, uint32_t other, const LatticePose& pose,
               bool other_leaf) {
-        const ChildRange children = body.tree.children(node);
+        const ChildRange children = body.children(node);
         if (children.count > budget()) return false;
-        const std::byte* const other_block = other_body.tree.block(other / kBlockLanes);
+        // Often the same node is tested against one sibling's children after another's.
+        Placed& placed = placed_[kB];
+        if (placed.node != other) {
+            placed.single = place_here(other_body.tree.block(other / kBlockLanes), other % kBlockLanes, pose);
+            placed.node = other;
+        }
         for (uint32_t i = 0; i < children.count; i += kBlockLanes)
-            test<kB>(body, other_block, children.first + i, std::min(children.count - i, kBlockLanes), pose, other,
+            test<kB>(body, children.first + i, std::min(children.count - i, kBlockLanes), placed.single, other,
                      other_leaf);
         return true;
     }
 
     // One block against one node: pushes the pairs that meet, the deepest last.
     template <bool kB>
-    void test(Body& body, const std::byte* other_block, uint32_t first, uint32_t count, const LatticePose& pose,
-              uint32_t other, bool other_leaf) {
+    void test(Body& body, uint32_t first, uint32_t count, const Single& single, uint32_t other, bool other_leaf) {
         const LaneTag d;
         const std::byte* const block = body.tree.block(first / kBlockLanes);
-        const Single single = place_here(other_block, other % kBlockLanes, pose);
         d_.stats.pair_tests += count, ++d_.stats.block_tests;
         body.deepest = std::max(body.deepest, first + count - 1);
         const float lattice_margin = kMargin ? margin_in(body.lattice) : 0.0f;
-        const uint32_t boxes = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
-        if (boxes == 0) return;
-        uint32_t meet = 0, larger = 0;
+        uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
+        if (meet == 0) return;
+        uint32_t met = 0, larger = 0;
         alignas(32) float depth[kBlockLanes];
         const Lanes margin = hn::Set(d, lattice_margin);
         for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
             const LaneTerms t = evaluate(load_nodes(block, i, body.lattice.step_exponent), single);
-            meet |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
+            met |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
             larger |= bits_of(hn::Gt(t.size, hn::Set(d, single.size)), i);
             hn::StoreU(hn::Div(t.p, t.sum), d, depth + i);
         }
-        meet &= boxes;
+        meet &= met;
         if (meet == 0) return;
-        // Leaves among the lanes: no children, or a count of triangles.
-        uint32_t leaves = 0;
-        const std::byte* const counts = block + kBlockCount;
-        for (uint32_t i = 0; i < kBlockLanes; ++i) {
-            const auto c = static_cast<uint8_t>(counts[i]);
-            leaves |= uint32_t{c == 0 || c >= 128} << i;
-        }
-        if (first >= body.leaves_from) leaves = 0xff;
+        const uint32_t leaves = first >= body.leaves_from ? 0xff : leaf_lanes(block);
         const uint32_t begin = size_;
         uint32_t deepest = begin;
         float least = HUGE_VALF;
@@ -130,6 +129,16 @@ private:
         std::swap(stack_[deepest], stack_[size_ - 1]);
     }
 
+    // Bit i: lane i, if there is such a node, has no children: its count is 0, or one of triangles.
+    static uint32_t leaf_lanes(const std::byte* block) {
+        static_assert(kTriangleLeaf == 0x80);
+        constexpr uint64_t kTop = 0x8080808080808080;
+        const auto counts = load_le<uint64_t>(block + kBlockCount);
+        const uint64_t some = (counts & ~kTop) + ~kTop; // top bit of a byte: its lower bits are not all zero
+        const uint64_t leaves = (counts | ~some) & kTop;
+        return static_cast<uint32_t>((leaves >> 7) * 0x0102040810204080 >> 56); // gathers one bit of each byte
+    }
+
     // options.margin + skin in lattice steps, rounded up.
     float margin_in(const LatticeInfo& lattice) const {
         return static_cast<float>(std::ldexp((double{d_.options.margin} + d_.skin) * kRoundUp, -lattice.step_exponent));
@@ -139,6 +148,12 @@ private:
     // Opening a node takes one entry off and puts at most kMaxDegree on, and no pair lies deeper than both trees
     // together.
     static_assert(QueryContext::kEntries > 2 * (kMaxLevels - 1) * (kMaxDegree - 1) + 1);
+    // The nodes that were placed last: of B in A's lattice, of A in B's.
+    struct Placed {
+        Single single;
+        uint32_t node = UINT32_MAX;
+    };
+    Placed placed_[2];
     Descent& d_;
     QueryContext::Entry* const stack_;
     uint32_t size_ = 0;

@@ -36,7 +36,8 @@
 
 #include <hwy/highway.h>
 
-#include <cmath>
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 
 // clang-format off
@@ -102,58 +103,159 @@ HWY_INLINE LaneNodes load_nodes(const std::byte* block, size_t first, int32_t st
     return out;
 }
 
-/// place() of lanes.hpp, which has the same operations: the columns of the factor as vectors of four.
-HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const LatticePose& pose) {
-    const LaneNode e = load_node(block, lane, pose.exponent_from);
-    Single s;
-    place_center(e, pose, s);
+// The sum of the first three components, in the first.
+template <class V> HWY_INLINE V sum_of_three(V v) {
 #if HWY_TARGET == HWY_SCALAR
-    place_factor(e, pose, s);
+    return v; // not used
+#else
+    return hn::Add(hn::Add(v, hn::Shuffle0321(v)), hn::Shuffle1032(v));
+#endif
+}
+
+/// place() of lanes.hpp, which has the same operations: vectors of four hold x, y, z.
+HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const LatticePose& pose) {
+#if HWY_TARGET == HWY_SCALAR
+    return place(block, lane, pose);
 #else
     const hn::FixedTag<float, 4> d;
-    const auto r0 = hn::LoadU(d, pose.linear_rounded[0]), r1 = hn::LoadU(d, pose.linear_rounded[1]),
-               r2 = hn::LoadU(d, pose.linear_rounded[2]);
-    const auto set = [d](float value) { return hn::Set(d, value); };
-    const auto f0 = hn::Add(hn::Add(hn::Mul(r0, set(e.l11)), hn::Mul(r1, set(e.l21))), hn::Mul(r2, set(e.l31)));
-    const auto f1 = hn::Add(hn::Mul(r1, set(e.l22)), hn::Mul(r2, set(e.l32))), f2 = hn::Mul(r2, set(e.l33));
-    hn::StoreU(f0, d, s.factor[0]), hn::StoreU(f1, d, s.factor[1]), hn::StoreU(f2, d, s.factor[2]);
-    const auto column = [&](auto x, auto y, auto z) {
-        return hn::Add(hn::Add(hn::Mul(f0, x), hn::Mul(f1, y)), hn::Mul(f2, z));
+    const hn::FixedTag<int32_t, 4> d32;
+    const hn::FixedTag<uint8_t, 16> d8;
+    const auto load = [&](size_t offset) {
+        return hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + offset));
     };
-    const auto q0 = column(hn::Broadcast<0>(f0), hn::Broadcast<0>(f1), hn::Broadcast<0>(f2));
-    const auto q1 = column(hn::Broadcast<1>(f0), hn::Broadcast<1>(f1), hn::Broadcast<1>(f2));
-    const auto q2 = column(hn::Broadcast<2>(f0), hn::Broadcast<2>(f1), hn::Broadcast<2>(f2));
-    hn::StoreU(q0, d, s.shape[0]), hn::StoreU(q1, d, s.shape[1]), hn::StoreU(q2, d, s.shape[2]);
-#endif
-    place_size(pose.reach, s);
-    place_box(s);
-    cut_box(block, lane, pose, s);
+    // Bytes of a row to the places that a table names, moved on by the lane's; 0x80: a zero.
+    constexpr uint8_t o = 0x80;
+    alignas(16) static constexpr uint8_t kFirst[] = {0, 1, o, o, o, o, o, o, o, o, o, o, o, o, o, o};
+    alignas(16) static constexpr uint8_t kSecond[] = {o, o, o, o, 0, 1, o, o, o, o, o, o, o, o, o, o};
+    alignas(16) static constexpr uint8_t kThird[] = {o, o, o, o, o, o, o, o, 0, 1, o, o, o, o, o, o};
+    alignas(16) static constexpr uint8_t kLower[] = {0, 1, o, o, 0, 1, o, o, 0, 1, o, o, 0, 1, o, o};
+    alignas(16) static constexpr uint8_t kUpper[] = {o, o, 0, 1, o, o, 0, 1, o, o, 0, 1, o, o, 0, 1};
+    alignas(16) static constexpr uint8_t kTwoRows[] = {0, o, o, o, 8, o, o, o, o, o, o, o, o, o, o, o};
+    alignas(16) static constexpr uint8_t kLastRow[] = {o, o, o, o, o, o, o, o, 8, o, o, o, o, o, o, o};
+    const auto bytes = hn::Set(d8, static_cast<uint8_t>(lane)), words = hn::Set(d8, static_cast<uint8_t>(2 * lane));
+    const auto pick = [&](auto row, const uint8_t* places, auto on) {
+        return hn::BitCast(d32, hn::TableLookupBytesOr0(row, hn::Add(hn::Load(d8, places), on)));
+    };
+    const auto word = [&](size_t array, size_t row, const uint8_t* places) {
+        return pick(load(array + 2 * kBlockLanes * row), places, words);
+    };
+
+    // The node as stored, each number of the factor in all four components.
+    const auto stored_center =
+        hn::ConvertTo(d, hn::Or(hn::Or(word(kBlockCenter, 0, kFirst), word(kBlockCenter, 1, kSecond)),
+                                word(kBlockCenter, 2, kThird)));
+    const int32_t exponent = load_le<int8_t>(block + kBlockExponent + lane) - (16 + pose.exponent_from);
+    const auto one = hn::Set(d, std::bit_cast<float>((std::clamp(exponent, kLowestExponent, kHighestExponent) + 127)
+                                                     << 23));
+    const auto upper = hn::Mul(one, hn::Set(d, 0x1p-15f)); // off-diagonal integers count twice, and stand 16 bits up
+    const auto diagonal = [&](size_t row) { return hn::Mul(hn::ConvertTo(d, word(kBlockDiagonal, row, kLower)), one); };
+    const auto off_diagonal = [&](size_t row) {
+        return hn::Mul(hn::ConvertTo(d, word(kBlockOffDiagonal, row, kUpper)), upper);
+    };
+    const auto l21 = off_diagonal(0), l31 = off_diagonal(1), l32 = off_diagonal(2);
+
+    Single s;
+    const auto coordinate = [&](size_t row) {
+        return double{static_cast<float>(load_le<uint16_t>(block + block_offset(kBlockCenter, row, lane)))};
+    };
+    const hn::CappedTag<double, 4> d64;
+    const auto x = hn::Set(d64, coordinate(0)), y = hn::Set(d64, coordinate(1)), z = hn::Set(d64, coordinate(2));
+    for (size_t i = 0; i < 4; i += hn::Lanes(d64)) {
+        const auto column = [&](size_t c) { return hn::Load(d64, pose.linear[c] + i); };
+        const auto exact = hn::Add(hn::Add(hn::Mul(column(0), x), hn::Mul(column(1), y)),
+                                   hn::Add(hn::Mul(column(2), z), hn::Load(d64, pose.offset + i)));
+        const hn::Rebind<float, decltype(d64)> rounded;
+        hn::Store(exact, d64, s.exact + i), hn::StoreU(hn::DemoteTo(rounded, exact), rounded, s.center + i);
+    }
+    const auto center = hn::Load(d, s.center);
+
+    const auto r0 = hn::Load(d, pose.linear_rounded[0]), r1 = hn::Load(d, pose.linear_rounded[1]),
+               r2 = hn::Load(d, pose.linear_rounded[2]);
+    const auto along = [&](auto a, auto b, auto c, auto at_x, auto at_y, auto at_z) {
+        return hn::Add(hn::Add(hn::Mul(a, at_x), hn::Mul(b, at_y)), hn::Mul(c, at_z));
+    };
+    const auto f0 = along(r0, r1, r2, diagonal(0), l21, l31);
+    const auto f1 = hn::Add(hn::Mul(r1, diagonal(1)), hn::Mul(r2, l32)), f2 = hn::Mul(r2, diagonal(2));
+    hn::Store(f0, d, s.factor[0]), hn::Store(f1, d, s.factor[1]), hn::Store(f2, d, s.factor[2]);
+    const auto squares = along(f0, f1, f2, f0, f1, f2);
+    hn::Store(squares, d, s.diagonal);
+    hn::Store(along(f0, f1, f2, hn::Shuffle0321(f0), hn::Shuffle0321(f1), hn::Shuffle0321(f2)), d, s.off_diagonal);
+
+    const auto size = hn::Sqrt(sum_of_three(squares));
+    s.size = hn::GetLane(size), s.weight = hn::GetLane(hn::Div(hn::Set(d, 1), size));
+    const auto slack = hn::Broadcast<0>(hn::Add(
+        hn::Mul(hn::Set(d, kLaneMargin), hn::Add(sum_of_three(hn::Abs(center)), size)), hn::Set(d, common_slack(pose.reach))));
+    s.slack = hn::GetLane(slack), s.reach = pose.reach;
+    const auto half_ellipsoid = hn::Add(hn::Sqrt(squares), slack);
+    const auto low = hn::Sub(center, half_ellipsoid), high = hn::Add(center, half_ellipsoid);
+
+    const auto corner = [&](size_t array) {
+        return hn::Or(pick(load(array), kTwoRows, bytes), pick(load(array + kBlockLanes), kLastRow, bytes));
+    };
+    const auto box_low = corner(kBlockBoxLow), box_high = corner(kBlockBoxHigh);
+    const hn::Rebind<uint8_t, decltype(d32)> four;
+    const auto box_exponent = hn::PromoteTo(
+        d32, hn::LoadU(four, reinterpret_cast<const uint8_t*>(block + kBlockBoxExponent)));
+    const auto half_step = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(box_exponent, hn::Set(d32, 126))));
+    const auto origin = hn::ConvertTo(d, hn::BitCast(d32, load(kBlockBoxOrigin)));
+    const auto box_center = hn::Add(origin, hn::Mul(hn::ConvertTo(d, hn::Add(box_low, box_high)), half_step));
+    const auto away = hn::Sub(box_center, stored_center);
+    const auto half = hn::Add(hn::Mul(hn::ConvertTo(d, hn::Sub(box_high, box_low)), half_step),
+                              hn::Add(hn::Mul(hn::Set(d, kBoxMargin), hn::Abs(box_center)), hn::Set(d, kBoxSlack)));
+    const auto at = hn::Add(
+        center, along(r0, r1, r2, hn::Broadcast<0>(away), hn::Broadcast<1>(away), hn::Broadcast<2>(away)));
+    const auto half_box = hn::Add(slack, along(hn::Abs(r0), hn::Abs(r1), hn::Abs(r2), hn::Broadcast<0>(half),
+                                               hn::Broadcast<1>(half), hn::Broadcast<2>(half)));
+    const auto from = hn::Sub(at, half_box), to = hn::Add(at, half_box);
+    hn::Store(hn::IfThenElse(hn::Gt(from, low), from, low), d, s.low);
+    hn::Store(hn::IfThenElse(hn::Lt(to, high), to, high), d, s.high);
     return s;
+#endif
 }
 
 /// Bit i: the boxes do not tell lane i apart from the single.
 HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float margin) {
-    uint32_t meet = (1u << kBlockLanes) - 1;
-    for (size_t i = 0; i < 3; ++i) {
-        const auto [least, most] = box_thresholds(block, i, s, margin);
-        if (least > 255 || most < 0) return 0;
-        const auto row = [block, i](size_t array) { return block + array + kBlockLanes * i; };
 #if HWY_TARGET == HWY_SCALAR
-        for (uint32_t lane = 0; lane < kBlockLanes; ++lane)
-            if (int32_t{load_le<uint8_t>(row(kBlockBoxLow) + lane)} > most ||
-                int32_t{load_le<uint8_t>(row(kBlockBoxHigh) + lane)} < least)
-                meet &= ~(1u << lane);
-#else
-        const hn::FixedTag<uint8_t, kBlockLanes> d;
-        const auto load = [&](size_t array) { return hn::LoadU(d, reinterpret_cast<const uint8_t*>(row(array))); };
-        const auto apart = hn::Or(hn::Gt(load(kBlockBoxLow), hn::Set(d, static_cast<uint8_t>(most))),
-                                  hn::Lt(load(kBlockBoxHigh), hn::Set(d, static_cast<uint8_t>(least))));
-        uint8_t bits[8] = {};
-        hn::StoreMaskBits(d, apart, bits);
-        meet &= ~uint32_t{bits[0]};
-#endif
-    }
+    uint32_t meet = 0;
+    for (uint32_t lane = 0; lane < kBlockLanes; ++lane)
+        meet |= uint32_t{!boxes_apart(block, lane, s, margin)} << lane;
     return meet;
+#else
+    // Along an axis, a lane's box meets the single's if its upper end is at least `least` and its lower end at most
+    // `most`, box steps: integers, rounded so that too many meet rather than too few. NaN lets all meet. What rounding
+    // costs in the differences, 2 u of the lengths, is a fraction of the slack in s.low and s.high.
+    const hn::FixedTag<float, 4> d;
+    const hn::FixedTag<int32_t, 4> d32;
+    const hn::Rebind<uint8_t, decltype(d32)> four;
+    const auto exponent = hn::PromoteTo(
+        d32, hn::LoadU(four, reinterpret_cast<const uint8_t*>(block + kBlockBoxExponent)));
+    const auto per_step = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(d32, 127), exponent)));
+    const hn::FixedTag<uint8_t, 16> d8;
+    const auto origin = hn::ConvertTo(
+        d, hn::BitCast(d32, hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + kBlockBoxOrigin))));
+    const auto inflation = hn::Set(d, margin), zero = hn::Zero(d), last = hn::Set(d, 255);
+    const auto low = hn::Mul(hn::Sub(hn::Sub(hn::Load(d, s.low), inflation), origin), per_step);
+    const auto high = hn::Mul(hn::Sub(hn::Add(hn::Load(d, s.high), inflation), origin), per_step);
+    const auto least = hn::Min(hn::IfThenElse(hn::Gt(low, zero), hn::Add(low, hn::Set(d, kAlmostOne)), zero),
+                               hn::Set(d, 256));
+    const auto most = hn::Max(hn::IfThenElse(hn::Lt(high, last), high, last), hn::Set(d, -1));
+    alignas(16) int32_t bounds[2][4];
+    hn::Store(hn::ConvertTo(d32, least), d32, bounds[0]), hn::Store(hn::ConvertTo(d32, most), d32, bounds[1]);
+
+    const hn::FixedTag<int16_t, kBlockLanes> d16;
+    const hn::Rebind<uint8_t, decltype(d16)> eight;
+    const auto apart = [&](size_t i) {
+        const auto ends = [&](size_t array) {
+            return hn::PromoteTo(
+                d16, hn::LoadU(eight, reinterpret_cast<const uint8_t*>(block + array + kBlockLanes * i)));
+        };
+        const auto bound = [&](size_t which) { return hn::Set(d16, static_cast<int16_t>(bounds[which][i])); };
+        return hn::Or(hn::Gt(bound(0), ends(kBlockBoxHigh)), hn::Gt(ends(kBlockBoxLow), bound(1)));
+    };
+    uint8_t bits[8] = {};
+    hn::StoreMaskBits(d16, hn::Or(apart(0), hn::Or(apart(1), apart(2))), bits);
+    return ~uint32_t{bits[0]} & ((1u << kBlockLanes) - 1);
+#endif
 }
 
 HWY_INLINE Lanes sum_of_squares(Lanes x, Lanes y, Lanes z) {
@@ -203,12 +305,12 @@ HWY_INLINE LaneShapes mixed(const LaneShapes& q, Lanes w1, Lanes w2, const Singl
     const LaneTag d;
     const Lanes weight = hn::Mul(w1, hn::Set(d, s.weight));
     const auto mix = [&](float q1, Lanes q2) { return hn::Add(hn::Mul(weight, hn::Set(d, q1)), hn::Mul(w2, q2)); };
-    return {mix(s.shape[0][0], q.xx),
-            mix(s.shape[1][1], q.yy),
-            mix(s.shape[2][2], q.zz),
-            mix(s.shape[1][2], q.yz),
-            mix(s.shape[0][2], q.xz),
-            mix(s.shape[0][1], q.xy),
+    return {mix(s.diagonal[0], q.xx),
+            mix(s.diagonal[1], q.yy),
+            mix(s.diagonal[2], q.zz),
+            mix(s.off_diagonal[1], q.yz),
+            mix(s.off_diagonal[2], q.xz),
+            mix(s.off_diagonal[0], q.xy),
             q.size};
 }
 /// a = |L1^T n|.

@@ -8,30 +8,74 @@
 
 namespace prolate::query {
 
-void place_shape(Single& s) noexcept {
-    const auto& f = s.factor;
-    for (size_t j = 0; j < 3; ++j)
-        for (size_t i = 0; i < 4; ++i) s.shape[j][i] = f[0][i] * f[0][j] + f[1][i] * f[1][j] + f[2][i] * f[2][j];
+namespace {
+
+// What a node's box says, in coordinates of its own tree: center and half the width.
+struct LaneBox {
+    float center[3], half[3];
+};
+LaneBox box_of(const std::byte* block, uint32_t lane) {
+    LaneBox out;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto byte = [&](size_t array) {
+            return int32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
+        };
+        const int32_t low = byte(kBlockBoxLow), high = byte(kBlockBoxHigh);
+        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
+        const float half_step = std::bit_cast<float>((126 + exponent) << 23);
+        const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
+        out.center[i] = origin + static_cast<float>(low + high) * half_step;
+        out.half[i] = static_cast<float>(high - low) * half_step + (kBoxMargin * std::abs(out.center[i]) + kBoxSlack);
+    }
+    return out;
 }
 
-void place_factor(const LaneNode& e, const LatticePose& pose, Single& s) noexcept {
+// All that follows from the center and the factor.
+void complete(double reach, Single& s) {
+    const auto& f = s.factor;
+    for (size_t i = 0; i < 3; ++i) {
+        const size_t j = (i + 1) % 3;
+        s.diagonal[i] = f[0][i] * f[0][i] + f[1][i] * f[1][i] + f[2][i] * f[2][i];
+        s.off_diagonal[i] = f[0][i] * f[0][j] + f[1][i] * f[1][j] + f[2][i] * f[2][j];
+    }
+    s.size = std::sqrt(s.diagonal[0] + s.diagonal[1] + s.diagonal[2]);
+    s.weight = 1 / s.size;
+    const float center = std::abs(s.center[0]) + std::abs(s.center[1]) + std::abs(s.center[2]);
+    s.slack = kLaneMargin * (center + s.size) + common_slack(reach);
+    s.reach = reach;
+    for (size_t i = 0; i < 3; ++i) {
+        const float half = std::sqrt(s.diagonal[i]) + s.slack; // slack is far above what rounding costs here
+        s.low[i] = s.center[i] - half, s.high[i] = s.center[i] + half;
+    }
+}
+
+} // namespace
+
+Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noexcept {
+    const LaneNode e = load_node(block, lane, pose.exponent_from);
+    const LaneBox box = box_of(block, lane);
+    Single s{};
+    const auto& m = pose.linear;
     const auto& r = pose.linear_rounded;
-    for (size_t i = 0; i < 4; ++i) {
+    const double x = e.center[0], y = e.center[1], z = e.center[2];
+    for (size_t i = 0; i < 3; ++i) {
+        s.exact[i] = (m[0][i] * x + m[1][i] * y) + (m[2][i] * z + pose.offset[i]);
+        s.center[i] = static_cast<float>(s.exact[i]);
         s.factor[0][i] = r[0][i] * e.l11 + r[1][i] * e.l21 + r[2][i] * e.l31;
         s.factor[1][i] = r[1][i] * e.l22 + r[2][i] * e.l32;
         s.factor[2][i] = r[2][i] * e.l33;
     }
-    place_shape(s);
-}
-
-Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noexcept {
-    const LaneNode e = load_node(block, lane, pose.exponent_from);
-    Single s;
-    place_center(e, pose, s);
-    place_factor(e, pose, s);
-    place_size(pose.reach, s);
-    place_box(s);
-    cut_box(block, lane, pose, s);
+    complete(pose.reach, s);
+    // Cut with the box around the node's own box, as it lies in these coordinates.
+    float away[3];
+    for (size_t i = 0; i < 3; ++i) away[i] = box.center[i] - e.center[i];
+    for (size_t i = 0; i < 3; ++i) {
+        const float at = s.center[i] + (r[0][i] * away[0] + r[1][i] * away[1] + r[2][i] * away[2]);
+        const float half = s.slack + (std::abs(r[0][i]) * box.half[0] + std::abs(r[1][i]) * box.half[1] +
+                                      std::abs(r[2][i]) * box.half[2]);
+        if (at - half > s.low[i]) s.low[i] = at - half;
+        if (at + half < s.high[i]) s.high[i] = at + half;
+    }
     return s;
 }
 
@@ -48,21 +92,25 @@ Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexc
             s.factor[column][i] =
                 static_cast<float>(ellipsoid.factor[static_cast<glm::length_t>(column)][g] * per_step);
     }
-    place_shape(s);
-    place_size(reach, s);
-    place_box(s);
+    complete(reach, s);
     return s;
 }
 
 bool boxes_apart(const std::byte* block, uint32_t lane, const Single& s, float margin) noexcept {
+    bool apart = false;
     for (size_t i = 0; i < 3; ++i) {
-        const auto [least, most] = box_thresholds(block, i, s, margin);
         const auto byte = [&](size_t array) {
             return int32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
         };
-        if (byte(kBlockBoxLow) > most || byte(kBlockBoxHigh) < least) return true;
+        const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
+        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
+        const float per_step = std::bit_cast<float>((127 - exponent) << 23);
+        const float low = ((s.low[i] - margin) - origin) * per_step, high = ((s.high[i] + margin) - origin) * per_step;
+        const float least = std::min(low > 0 ? low + kAlmostOne : 0.0f, 256.0f);
+        const float most = std::max(high < 255 ? high : 255.0f, -1.0f);
+        apart |= byte(kBlockBoxHigh) < static_cast<int32_t>(least) || byte(kBlockBoxLow) > static_cast<int32_t>(most);
     }
-    return false;
+    return apart;
 }
 
 LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& s) noexcept {
@@ -75,8 +123,8 @@ LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, c
     out.size = std::sqrt(xx + yy + zz);
     const float w2 = 1 / (out.size * (out.size + s.size)), w1 = out.size * w2 * s.weight;
     const auto mix = [&](float q1, float q2) { return w1 * q1 + w2 * q2; };
-    const float qxx = mix(s.shape[0][0], xx), qyy = mix(s.shape[1][1], yy), qzz = mix(s.shape[2][2], zz);
-    const float qyz = mix(s.shape[1][2], zy), qxz = mix(s.shape[0][2], zx), qxy = mix(s.shape[0][1], yx);
+    const float qxx = mix(s.diagonal[0], xx), qyy = mix(s.diagonal[1], yy), qzz = mix(s.diagonal[2], zz);
+    const float qyz = mix(s.off_diagonal[1], zy), qxz = mix(s.off_diagonal[2], zx), qxy = mix(s.off_diagonal[0], yx);
     const float rx = e.center[0] - s.center[0], ry = e.center[1] - s.center[1], rz = e.center[2] - s.center[2];
     const float axx = qyy * qzz - qyz * qyz, ayy = qxx * qzz - qxz * qxz, azz = qxx * qyy - qxy * qxy;
     const float axy = qxz * qyz - qxy * qzz, axz = qxy * qyz - qxz * qyy, ayz = qxy * qxz - qxx * qyz;

@@ -21,19 +21,25 @@ inline constexpr float kLaneDirection = 0x1p-60f; ///< least |n|_1 of a directio
 inline constexpr int32_t kLowestExponent = -60, kHighestExponent = 100;
 /// Bounds the length of a stored center, lattice steps.
 inline constexpr float kLargestCenter = 113512;
+/// 8 u: half a box's width grows by this share of the length of the box's center, and by kBoxSlack = 2^16 kBoxMargin.
+inline constexpr float kBoxMargin = 0x1p-21f, kBoxSlack = 0x1p-5f;
+/// Turns truncation into rounding up, or down by at most 2^-10.
+inline constexpr float kAlmostOne = 1 - 0x1p-10f;
 
-/// An ellipsoid in the lattice coordinates of the block it is tested against.
+/// An ellipsoid in the lattice coordinates of the block it is tested against. Vectors have a fourth component, which
+/// kernels carry along: of columns, it repeats the first; of boxes, it means nothing.
 struct Single {
-    float center[3];
-    float factor[3][4]; ///< L1, columns; the fourth component is 0
-    float shape[3][4];  ///< L1 L1^T, likewise
-    float size;         ///< |L1|
-    float weight;       ///< 1 / size
-    float slack;        ///< the lane-independent part of the margin, a multiple of |n|_1
-    float low[4];       ///< its box in these coordinates, outward rounded; the fourth component is 0
-    float high[4];
-    double exact[3]; ///< the center before it was rounded to float
-    double reach;    ///< bounds every length that entered it: rounding in double costs less than 2^-44 of it
+    alignas(32) double exact[4];      ///< the center before it was rounded to float
+    alignas(16) float center[4];
+    alignas(16) float factor[3][4];   ///< L1, columns
+    alignas(16) float diagonal[4];    ///< of Q1 = L1 L1^T: xx, yy, zz
+    alignas(16) float off_diagonal[4]; ///< xy, yz, zx
+    alignas(16) float low[4];         ///< its box in these coordinates, outward rounded
+    alignas(16) float high[4];
+    float size;   ///< |L1|
+    float weight; ///< 1 / size
+    float slack;  ///< the lane-independent part of the margin, a multiple of |n|_1
+    double reach; ///< bounds every length that entered it: rounding in double costs less than 2^-44 of it
 };
 
 /// A node as stored, lattice steps of its own tree.
@@ -57,79 +63,15 @@ inline LaneNode load_node(const std::byte* block, uint32_t lane, int32_t step_ex
             natural(kBlockDiagonal, 2) * one};
 }
 
-// The parts of place(): center, factor and shape, and what follows from them.
-inline void place_center(const LaneNode& e, const LatticePose& pose, Single& s) {
-    const auto& m = pose.linear;
-    const double x = e.center[0], y = e.center[1], z = e.center[2];
-    for (size_t i = 0; i < 3; ++i) {
-        s.exact[i] = (m[0][i] * x + m[1][i] * y) + (m[2][i] * z + pose.offset[i]);
-        s.center[i] = static_cast<float>(s.exact[i]);
-    }
-}
-void place_shape(Single& s) noexcept;
-void place_factor(const LaneNode& e, const LatticePose& pose, Single& s) noexcept;
-inline void place_size(double reach, Single& s) {
-    s.size = std::sqrt(s.shape[0][0] + s.shape[1][1] + s.shape[2][2]);
-    s.weight = 1 / s.size;
-    const float center = std::abs(s.center[0]) + std::abs(s.center[1]) + std::abs(s.center[2]);
-    s.slack = kLaneMargin * (center + kLargestCenter + s.size) + static_cast<float>(0x1p-42 * reach);
-    s.reach = reach;
-}
-// The box around the ellipsoid, widened by the slack, which is far above what rounding costs here.
-inline void place_box(Single& s) {
-    for (size_t i = 0; i < 3; ++i) {
-        const float half = std::sqrt(s.shape[i][i]) + s.slack;
-        s.low[i] = s.center[i] - half, s.high[i] = s.center[i] + half;
-    }
-    s.low[3] = s.high[3] = 0;
-}
-// Cut with the box around the node's own box, as it lies in these coordinates.
-inline void cut_box(const std::byte* block, uint32_t lane, const LatticePose& pose, Single& s) {
-    double center[3];
-    float half[3];
-    for (size_t i = 0; i < 3; ++i) {
-        const auto byte = [&](size_t array) {
-            return uint32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
-        };
-        const uint32_t low = byte(kBlockBoxLow), high = byte(kBlockBoxHigh);
-        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
-        const float half_step = std::bit_cast<float>((126 + exponent) << 23);
-        half[i] = static_cast<float>(high - low) * half_step;
-        center[i] =
-            load_le<int32_t>(block + kBlockBoxOrigin + 4 * i) + double{static_cast<float>(low + high) * half_step};
-    }
-    const auto& m = pose.linear;
-    const auto& r = pose.linear_rounded;
-    for (size_t i = 0; i < 3; ++i) {
-        const auto at =
-            static_cast<float>((m[0][i] * center[0] + m[1][i] * center[1]) + (m[2][i] * center[2] + pose.offset[i]));
-        const float reach =
-            (std::abs(r[0][i]) * half[0] + std::abs(r[1][i]) * half[1] + std::abs(r[2][i]) * half[2]) + s.slack;
-        s.low[i] = std::max(s.low[i], at - reach), s.high[i] = std::min(s.high[i], at + reach);
-    }
+/// The share of Single::slack that is the same for all nodes.
+inline float common_slack(double reach) {
+    return kLaneMargin * kLargestCenter + static_cast<float>(0x1p-42 * reach);
 }
 
 /// Node `lane` of `block`, which belongs to the tree that `pose` comes from.
 Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noexcept;
 /// An ellipsoid given in metres of a body frame, in the lattice of a tree in the same frame.
 Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexcept;
-
-/// Along axis `i`, boxes of the block meet the single's if their upper end is at least `least`, and their lower end at
-/// most `most`, box steps. Both are integers, rounded so that too many meet rather than too few.
-struct BoxThresholds {
-    int32_t least, most;
-};
-inline BoxThresholds box_thresholds(const std::byte* block, size_t i, const Single& s, float margin) {
-    const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
-    const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
-    const float per_step = std::bit_cast<float>((127 - exponent) << 23);
-    // Rounding of the differences costs 2 u of the lengths, a fraction of the slack. NaN becomes a bound that all meet.
-    const float low = (s.low[i] - margin - origin) * per_step, high = (s.high[i] + margin - origin) * per_step;
-    const float least =
-        std::min(low > 0 ? low + (1 - 0x1p-10f) : 0.0f, 256.0f); // truncation then rounds up, or down by 2^-10
-    const float most = std::max(high < 255 ? high : 255.0f, -1.0f);
-    return {static_cast<int32_t>(least), static_cast<int32_t>(most)};
-}
 
 /// Is the lane's box certainly apart from that of the single, by more than `margin` along an axis?
 bool boxes_apart(const std::byte* block, uint32_t lane, const Single& single, float margin) noexcept;

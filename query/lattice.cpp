@@ -27,6 +27,11 @@ LatticePose lattice_pose(const RelativePose& from_to, const LatticeInfo& from, c
         out.offset[r] = (turned * scale + from_to.translation[row] * per_step_to) - to_origin[r];
         origin_from += from_origin[r] * from_origin[r], origin_to += to_origin[r] * to_origin[r];
     }
+    for (size_t c = 0; c < 3; ++c) {
+        out.linear[c][3] = out.linear[c][0];
+        out.linear_rounded[c][3] = out.linear_rounded[c][0];
+    }
+    out.offset[3] = out.offset[0];
     out.reach =
         scale * (kLargestCenter + std::sqrt(origin_from)) + from_to.distance * per_step_to + std::sqrt(origin_to);
     return out;

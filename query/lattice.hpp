@@ -13,10 +13,11 @@ namespace prolate::query {
 /// From one body's lattice coordinates to another's: x_to = linear x_from + offset, where `linear` is a rotation times
 /// `scale`. All NaN if the relative pose is.
 struct LatticePose {
-    double linear[3][3]; ///< columns
-    double offset[3];
-    float linear_rounded[3][4]; ///< columns; the fourth component is 0
-    float scale;                ///< step_from / step_to
+    // Vectors of four, for kernels; the fourth component repeats the first.
+    alignas(32) double linear[3][4]; ///< columns
+    alignas(32) double offset[4];
+    alignas(16) float linear_rounded[3][4]; ///< columns
+    float scale;                            ///< step_from / step_to
     /// Bounds every length that entered a coordinate of x_to, in its lattice's steps, for a stored center. Rounding in
     /// double then costs less than 2^-44 of it (the terms: separation.hpp).
     double reach;
