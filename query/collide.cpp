@@ -33,100 +33,118 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
-// QueryContext::Entry::flags
-constexpr uint32_t kOpenB = 1, kLeafA = 2, kLeafB = 4;
+// QueryContext::Entry::flags: which of the two nodes is to be opened, and whether the other is a leaf; or both are.
+constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2, kLeaves = 4;
 
 template <bool kMargin> class Search {
 public:
-    explicit Search(Descent& descent) : d_(descent), stack_(descent.stack) {}
+    explicit Search(Descent& descent)
+        : d_(descent), stack_(descent.stack), sides_{{descent.a, descent.lattice_b_to_a},
+                                                     {descent.b, descent.lattice_a_to_b}} {}
 
     Verdict run() {
-        // The roots, as if they were the only children of a node that meets everything.
+        const Verdict verdict = search();
+        d_.stats.pair_tests = pair_tests_, d_.stats.block_tests = block_tests_;
+        d_.a.deepest = sides_[0].deepest, d_.b.deepest = sides_[1].deepest;
+        return verdict;
+    }
+
+private:
+    // One of the bodies, as that whose children are tested.
+    struct Side {
+        Side(const Body& body, const LatticePose& other_to_here)
+            : blocks(body.tree.block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
+              limit_from(body.limit_from), pose(other_to_here), per_step(std::ldexp(1.0, -step_exponent)) {}
+        const std::byte* block(uint32_t slot) const { return blocks + size_t{slot / kBlockLanes} * kBlockBytes; }
+
+        const std::byte* blocks;
+        int32_t step_exponent;
+        uint32_t leaves_from, limit_from, deepest = 0;
+        const LatticePose& pose;
+        double per_step;
+        // The other body's node that was placed here last: often it is tested against several blocks in a row.
+        uint32_t placed = UINT32_MAX;
+        Single single;
+    };
+
+    Verdict search() {
+        // The roots, as if B's were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
-        const bool leaf_a = is_leaf(d_.a, 0);
-        Placed& root = placed_[true];
-        root = {place_here(d_.a.tree.block(0), 0, d_.lattice_a_to_b), 0};
-        test<true>(d_.b, 0, 1, root.single, 0, leaf_a);
+        test_all(kOpenB, 0, 1, 0, d_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0);
         d_.roots_meet = size_ > 0;
         while (size_ > 0) {
             const auto e = stack_[--size_];
-            const bool leaf = (e.flags & (kLeafA | kLeafB)) == (kLeafA | kLeafB);
-            const bool open_b = (e.flags & kOpenB) != 0;
-            if (leaf) {
+            if ((e.flags & kLeaves) != 0) {
                 if (d_.meet(e.node_a, e.node_b)) return Verdict::overlapping;
                 continue;
             }
-            if (open_b ? e.node_b >= d_.b.limit_from : e.node_a >= d_.a.limit_from) { // max_level ends the descent
+            const uint32_t open = e.flags & kOpenB;
+            const uint32_t node = open != 0 ? e.node_b : e.node_a, other = open != 0 ? e.node_a : e.node_b;
+            const Side& side = sides_[open];
+            if (node >= side.limit_from) { // max_level ends the descent
                 if (d_.take({e.node_a, e.node_b, kNoTriangle, kNoTriangle})) return Verdict::overlapping;
                 continue;
             }
-            const bool going =
-                open_b ? open<true>(d_.b, e.node_b, d_.a, e.node_a, d_.lattice_a_to_b, (e.flags & kLeafA) != 0)
-                       : open<false>(d_.a, e.node_a, d_.b, e.node_b, d_.lattice_b_to_a, (e.flags & kLeafB) != 0);
-            if (!going) return Verdict::undecided;
+            const std::byte* const block = side.block(node);
+            const uint32_t lane = node % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
+            const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+            if (count > budget()) return Verdict::undecided;
+            if (count <= kBlockLanes)
+                test(open, first, count, other, e.flags & kOtherIsLeaf);
+            else
+                test_all(open, first, count, other, e.flags & kOtherIsLeaf);
         }
         return Verdict::separated;
     }
 
-private:
-    static bool is_leaf(const Body& body, uint32_t node) { return body.tree.is_leaf(node); }
-    uint64_t budget() const { return d_.options.max_pair_tests - d_.stats.pair_tests; }
+    uint64_t budget() const { return d_.options.max_pair_tests - pair_tests_; }
 
-    // Tests the children of `node`, which has some, against `other`, which is one of the other tree; false if the budget
-    // is too small.
-    template <bool kB>
-    bool open(Body& body, uint32_t node, const Body& other_body, uint32_t other, const LatticePose& pose,
-              bool other_leaf) {
-        const ChildRange children = body.children(node);
-        if (children.count > budget()) return false;
-        // Often the same node is tested against one sibling's children after another's.
-        Placed& placed = placed_[kB];
-        if (placed.node != other) {
-            placed.single = place_here(other_body.tree.block(other / kBlockLanes), other % kBlockLanes, pose);
-            placed.node = other;
-        }
-        for (uint32_t i = 0; i < children.count; i += kBlockLanes)
-            test<kB>(body, children.first + i, std::min(children.count - i, kBlockLanes), placed.single, other,
-                     other_leaf);
-        return true;
-    }
-
-    // One block against one node: pushes the pairs that meet, the deepest last.
-    template <bool kB>
-    void test(Body& body, uint32_t first, uint32_t count, const Single& single, uint32_t other, bool other_leaf) {
+    // One block, B's if kOpenB is given, against a node of the other tree: pushes the pairs that meet, the deepest last.
+    HWY_INLINE void test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
         const LaneTag d;
-        const std::byte* const block = body.tree.block(first / kBlockLanes);
-        d_.stats.pair_tests += count, ++d_.stats.block_tests;
-        body.deepest = std::max(body.deepest, first + count - 1);
-        const float lattice_margin = kMargin ? margin_in(body.lattice) : 0.0f;
-        uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
+        Side& side = sides_[open];
+        const std::byte* const block = side.block(first);
+        pair_tests_ += count, ++block_tests_;
+        side.deepest = std::max(side.deepest, first + count - 1);
+        if (side.placed != other) {
+            side.single = place_here(sides_[open ^ kOpenB].block(other), other % kBlockLanes, side.pose);
+            side.placed = other;
+        }
+        const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
+        uint32_t meet = boxes_meet(block, side.single, lattice_margin) & ((1u << count) - 1);
         if (meet == 0) return;
         uint32_t met = 0, larger = 0;
         alignas(32) float depth[kBlockLanes];
         const Lanes margin = hn::Set(d, lattice_margin);
         for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
-            const LaneTerms t = evaluate(load_nodes(block, i, body.lattice.step_exponent), single);
+            const LaneTerms t = evaluate(load_nodes(block, i, side.step_exponent), side.single);
             met |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
-            larger |= bits_of(hn::Gt(t.size, hn::Set(d, single.size)), i);
+            larger |= bits_of(hn::Gt(t.size, hn::Set(d, side.single.size)), i);
             hn::StoreU(hn::Div(t.p, t.sum), d, depth + i);
         }
         meet &= met;
         if (meet == 0) return;
-        const uint32_t leaves = first >= body.leaves_from ? 0xff : leaf_lanes(block);
-        const uint32_t begin = size_;
-        uint32_t deepest = begin;
+        const uint32_t leaves = first >= side.leaves_from ? 0xff : leaf_lanes(block);
+        const uint32_t opened = ~leaves & (other_is_leaf != 0 ? 0xff : larger);
+        const uint32_t if_opened = open | other_is_leaf;
+        const uint32_t if_leaf = other_is_leaf != 0 ? kLeaves : (open ^ kOpenB) | kOtherIsLeaf;
+        uint32_t deepest = size_;
         float least = HUGE_VALF;
         for (; meet != 0; meet &= meet - 1) {
             const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
-            const bool leaf = (leaves >> lane & 1) != 0;
-            const bool open_lane = !leaf && (other_leaf || (larger >> lane & 1) != 0);
-            const uint32_t node_a = kB ? other : first + lane, node_b = kB ? first + lane : other;
-            const uint32_t flags = (open_lane == kB ? kOpenB : 0) | (leaf ? (kB ? kLeafB : kLeafA) : 0) |
-                                   (other_leaf ? (kB ? kLeafA : kLeafB) : 0);
+            const uint32_t node = first + lane, flags = (opened >> lane & 1) != 0   ? if_opened
+                                                        : (leaves >> lane & 1) != 0 ? if_leaf
+                                                                                    : open ^ kOpenB;
             if (depth[lane] < least) least = depth[lane], deepest = size_;
-            stack_[size_++] = {node_a, node_b, depth[lane], flags};
+            stack_[size_++] = {open != 0 ? other : node, open != 0 ? node : other, depth[lane], flags};
         }
         std::swap(stack_[deepest], stack_[size_ - 1]);
+    }
+
+    // Some or all children, where that is rare: in a loop with the usual case this would cost it registers.
+    HWY_NOINLINE void test_all(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
+        for (uint32_t i = 0; i < count; i += kBlockLanes)
+            test(open, first + i, std::min(count - i, kBlockLanes), other, other_is_leaf);
     }
 
     // Bit i: lane i, if there is such a node, has no children: its count is 0, or one of triangles.
@@ -140,23 +158,19 @@ private:
     }
 
     // options.margin + skin in lattice steps, rounded up.
-    float margin_in(const LatticeInfo& lattice) const {
-        return static_cast<float>(std::ldexp((double{d_.options.margin} + d_.skin) * kRoundUp, -lattice.step_exponent));
+    float margin_in(const Side& side) const {
+        return static_cast<float>((double{d_.options.margin} + d_.skin) * kRoundUp * side.per_step);
     }
     static constexpr double kRoundUp = 1 + 0x1p-20; // also pays for the rounding of margin |n|
 
     // Opening a node takes one entry off and puts at most kMaxDegree on, and no pair lies deeper than both trees
     // together.
     static_assert(QueryContext::kEntries > 2 * (kMaxLevels - 1) * (kMaxDegree - 1) + 1);
-    // The nodes that were placed last: of B in A's lattice, of A in B's.
-    struct Placed {
-        Single single;
-        uint32_t node = UINT32_MAX;
-    };
-    Placed placed_[2];
     Descent& d_;
     QueryContext::Entry* const stack_;
     uint32_t size_ = 0;
+    uint64_t pair_tests_ = 0, block_tests_ = 0;
+    Side sides_[2];
 };
 
 Verdict descend_target(Descent& descent) {

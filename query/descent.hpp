@@ -3,8 +3,6 @@
 
 #include "query/lattice.hpp"
 #include "query/separation.hpp"
-#include "src/block.hpp"
-#include "src/bytes.hpp"
 
 #include <prolate/collide.hpp>
 
@@ -22,12 +20,6 @@ struct Body {
     uint32_t deepest = 0; ///< largest slot that was tested
 
     uint32_t deepest_level() const noexcept;
-    /// Of a node that is no leaf.
-    ChildRange children(uint32_t node) const noexcept {
-        const std::byte* const block = tree.block(node / kBlockLanes);
-        const uint32_t lane = node % kBlockLanes;
-        return {load_le<uint32_t>(block + kBlockFirst + 4 * lane), load_le<uint8_t>(block + kBlockCount + lane)};
-    }
 };
 
 Body body(const TreeView& tree, uint32_t max_level) noexcept;

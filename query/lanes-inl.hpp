@@ -120,46 +120,33 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     const hn::FixedTag<float, 4> d;
     const hn::FixedTag<int32_t, 4> d32;
     const hn::FixedTag<uint8_t, 16> d8;
-    const auto load = [&](size_t offset) {
-        return hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + offset));
-    };
-    // Bytes of a row to the places that a table names, moved on by the lane's; 0x80: a zero.
-    constexpr uint8_t o = 0x80;
-    alignas(16) static constexpr uint8_t kFirst[] = {0, 1, o, o, o, o, o, o, o, o, o, o, o, o, o, o};
-    alignas(16) static constexpr uint8_t kSecond[] = {o, o, o, o, 0, 1, o, o, o, o, o, o, o, o, o, o};
-    alignas(16) static constexpr uint8_t kThird[] = {o, o, o, o, o, o, o, o, 0, 1, o, o, o, o, o, o};
-    alignas(16) static constexpr uint8_t kLower[] = {0, 1, o, o, 0, 1, o, o, 0, 1, o, o, 0, 1, o, o};
-    alignas(16) static constexpr uint8_t kUpper[] = {o, o, 0, 1, o, o, 0, 1, o, o, 0, 1, o, o, 0, 1};
-    alignas(16) static constexpr uint8_t kTwoRows[] = {0, o, o, o, 8, o, o, o, o, o, o, o, o, o, o, o};
-    alignas(16) static constexpr uint8_t kLastRow[] = {o, o, o, o, o, o, o, o, 8, o, o, o, o, o, o, o};
-    const auto bytes = hn::Set(d8, static_cast<uint8_t>(lane)), words = hn::Set(d8, static_cast<uint8_t>(2 * lane));
-    const auto pick = [&](auto row, const uint8_t* places, auto on) {
-        return hn::BitCast(d32, hn::TableLookupBytesOr0(row, hn::Add(hn::Load(d8, places), on)));
-    };
-    const auto word = [&](size_t array, size_t row, const uint8_t* places) {
-        return pick(load(array + 2 * kBlockLanes * row), places, words);
-    };
-
     // The node as stored, each number of the factor in all four components.
-    const auto stored_center =
-        hn::ConvertTo(d, hn::Or(hn::Or(word(kBlockCenter, 0, kFirst), word(kBlockCenter, 1, kSecond)),
-                                word(kBlockCenter, 2, kThird)));
     const int32_t exponent = load_le<int8_t>(block + kBlockExponent + lane) - (16 + pose.exponent_from);
     const auto one = hn::Set(d, std::bit_cast<float>((std::clamp(exponent, kLowestExponent, kHighestExponent) + 127)
                                                      << 23));
-    const auto upper = hn::Mul(one, hn::Set(d, 0x1p-15f)); // off-diagonal integers count twice, and stand 16 bits up
-    const auto diagonal = [&](size_t row) { return hn::Mul(hn::ConvertTo(d, word(kBlockDiagonal, row, kLower)), one); };
+    const auto two = hn::Add(one, one); // off-diagonal integers count twice as much
+    const auto diagonal = [&](size_t row) {
+        const auto twice = hn::Set(hn::FixedTag<uint16_t, 8>(),
+                                   load_le<uint16_t>(block + block_offset(kBlockDiagonal, row, lane)));
+        const auto stored = hn::ShiftRight<16>(hn::BitCast(hn::FixedTag<uint32_t, 4>(), twice));
+        return hn::Mul(hn::ConvertTo(d, hn::BitCast(d32, stored)), one);
+    };
     const auto off_diagonal = [&](size_t row) {
-        return hn::Mul(hn::ConvertTo(d, word(kBlockOffDiagonal, row, kUpper)), upper);
+        const auto twice = hn::Set(hn::FixedTag<int16_t, 8>(),
+                                   load_le<int16_t>(block + block_offset(kBlockOffDiagonal, row, lane)));
+        return hn::Mul(hn::ConvertTo(d, hn::ShiftRight<16>(hn::BitCast(d32, twice))), two);
     };
     const auto l21 = off_diagonal(0), l31 = off_diagonal(1), l32 = off_diagonal(2);
+    const auto coordinate = [&](size_t row) {
+        return int32_t{load_le<uint16_t>(block + block_offset(kBlockCenter, row, lane))};
+    };
+    const int32_t stored_x = coordinate(0), stored_y = coordinate(1), stored_z = coordinate(2);
+    const auto stored_center = hn::InsertLane(hn::InsertLane(hn::Set(d32, stored_x), 1, stored_y), 2, stored_z);
 
     Single s;
-    const auto coordinate = [&](size_t row) {
-        return double{static_cast<float>(load_le<uint16_t>(block + block_offset(kBlockCenter, row, lane)))};
-    };
     const hn::CappedTag<double, 4> d64;
-    const auto x = hn::Set(d64, coordinate(0)), y = hn::Set(d64, coordinate(1)), z = hn::Set(d64, coordinate(2));
+    const auto x = hn::Set(d64, double{stored_x}), y = hn::Set(d64, double{stored_y}),
+               z = hn::Set(d64, double{stored_z});
     for (size_t i = 0; i < 4; i += hn::Lanes(d64)) {
         const auto column = [&](size_t c) { return hn::Load(d64, pose.linear[c] + i); };
         const auto exact = hn::Add(hn::Add(hn::Mul(column(0), x), hn::Mul(column(1), y)),
@@ -189,8 +176,18 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     const auto half_ellipsoid = hn::Add(hn::Sqrt(squares), slack);
     const auto low = hn::Sub(center, half_ellipsoid), high = hn::Add(center, half_ellipsoid);
 
+    // The box: its corners' bytes stand eight apart in a row.
+    const auto load = [&](size_t offset) {
+        return hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + offset));
+    };
+    constexpr uint8_t o = 0x80; // gives a zero
+    alignas(16) static constexpr uint8_t kTwoRows[] = {0, o, o, o, 8, o, o, o, o, o, o, o, o, o, o, o};
+    alignas(16) static constexpr uint8_t kLastRow[] = {o, o, o, o, o, o, o, o, 8, o, o, o, o, o, o, o};
+    const auto move_on = hn::Set(d8, static_cast<uint8_t>(lane));
+    const auto two_rows = hn::Add(hn::Load(d8, kTwoRows), move_on), last_row = hn::Add(hn::Load(d8, kLastRow), move_on);
     const auto corner = [&](size_t array) {
-        return hn::Or(pick(load(array), kTwoRows, bytes), pick(load(array + kBlockLanes), kLastRow, bytes));
+        return hn::BitCast(d32, hn::Or(hn::TableLookupBytesOr0(load(array), two_rows),
+                                       hn::TableLookupBytesOr0(load(array + kBlockLanes), last_row)));
     };
     const auto box_low = corner(kBlockBoxLow), box_high = corner(kBlockBoxHigh);
     const hn::Rebind<uint8_t, decltype(d32)> four;
@@ -199,7 +196,7 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     const auto half_step = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(box_exponent, hn::Set(d32, 126))));
     const auto origin = hn::ConvertTo(d, hn::BitCast(d32, load(kBlockBoxOrigin)));
     const auto box_center = hn::Add(origin, hn::Mul(hn::ConvertTo(d, hn::Add(box_low, box_high)), half_step));
-    const auto away = hn::Sub(box_center, stored_center);
+    const auto away = hn::Sub(box_center, hn::ConvertTo(d, stored_center));
     const auto half = hn::Add(hn::Mul(hn::ConvertTo(d, hn::Sub(box_high, box_low)), half_step),
                               hn::Add(hn::Mul(hn::Set(d, kBoxMargin), hn::Abs(box_center)), hn::Set(d, kBoxSlack)));
     const auto at = hn::Add(
@@ -239,18 +236,21 @@ HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float ma
     const auto least = hn::Min(hn::IfThenElse(hn::Gt(low, zero), hn::Add(low, hn::Set(d, kAlmostOne)), zero),
                                hn::Set(d, 256));
     const auto most = hn::Max(hn::IfThenElse(hn::Lt(high, last), high, last), hn::Set(d, -1));
-    alignas(16) int32_t bounds[2][4];
-    hn::Store(hn::ConvertTo(d32, least), d32, bounds[0]), hn::Store(hn::ConvertTo(d32, most), d32, bounds[1]);
-
     const hn::FixedTag<int16_t, kBlockLanes> d16;
     const hn::Rebind<uint8_t, decltype(d16)> eight;
+    // Of each of them, the word that all lanes of an axis are compared with.
+    alignas(16) static constexpr uint8_t kWord[3][16] = {{0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1},
+                                                         {4, 5, 4, 5, 4, 5, 4, 5, 4, 5, 4, 5, 4, 5, 4, 5},
+                                                         {8, 9, 8, 9, 8, 9, 8, 9, 8, 9, 8, 9, 8, 9, 8, 9}};
+    const auto bound = [&](auto v, size_t i) {
+        return hn::BitCast(d16, hn::TableLookupBytes(hn::BitCast(d8, hn::ConvertTo(d32, v)), hn::Load(d8, kWord[i])));
+    };
     const auto apart = [&](size_t i) {
         const auto ends = [&](size_t array) {
             return hn::PromoteTo(
                 d16, hn::LoadU(eight, reinterpret_cast<const uint8_t*>(block + array + kBlockLanes * i)));
         };
-        const auto bound = [&](size_t which) { return hn::Set(d16, static_cast<int16_t>(bounds[which][i])); };
-        return hn::Or(hn::Gt(bound(0), ends(kBlockBoxHigh)), hn::Gt(ends(kBlockBoxLow), bound(1)));
+        return hn::Or(hn::Gt(bound(least, i), ends(kBlockBoxHigh)), hn::Gt(ends(kBlockBoxLow), bound(most, i)));
     };
     uint8_t bits[8] = {};
     hn::StoreMaskBits(d16, hn::Or(apart(0), hn::Or(apart(1), apart(2))), bits);
