@@ -15,10 +15,16 @@
 // separates, all by signs of volumes greater than their error.
 //
 // Rounding. u = 2^-24. Corners are relative to A's first and scaled by a power of two, so that coordinates are at most
-// R = 1; they are wrong by e <= u R + 80 * 2^-53 S (computed in double as in triangle.hpp, rounded to float once).
+// R = 1. They are wrong by e:
+//   A's, a difference                        u R
+//   B's, from its first corner               u |w|, and |w| <= 2 sqrt(3) R, for both its ends lie in the cube of R
+//        turned                              5 u |w| in all, the rounded matrix and 3 products and 2 sums included
+//        moved, by a rounded shift           2 u R
+//        which was computed in double        80 * 2^-53 S, as in triangle.hpp
+//   e <= 20 u R + 80 * 2^-53 S; kPlacementError is 24 u.
 //   differences of corners       2 u R each, and n.(...) of one 6 u |n|_1 R more: 8 u |n|_1 R
-//   gap, of two such and e       (8 + 8 + 2) u |n|_1 R + 2 e |n|_1 <= (20 u R + 160 * 2^-53 S) |n|_1
-// kDirection, 32 u, and kSeparationMargin S are demanded, and kUnderflow: numbers below 2^-126 may have been lost. As
+//   gap, of two such and e       (8 + 8 + 2) u |n|_1 R + 2 e |n|_1 <= (58 u R + 160 * 2^-53 S) |n|_1
+// LaneMarginFactors::direction, 64 u, and kSeparationMargin S are demanded, and kUnderflow: numbers below 2^-126 may have been lost. As
 // |n| <= |n|_1, what is found apart here is apart by more than 90 * 2^-53 S, as inside.hpp wants it.
 // Volumes: L bounds the coordinates of all edges and of B's corners from A's first, as computed.
 //   n = c x g                    8 u L^2 a coordinate, |n_k| <= 2 L^2

@@ -20,9 +20,12 @@ struct LaneMargins {
 };
 /// Their parts that do not depend on the leaves. The tests give others, to show that wrong ones are caught.
 struct LaneMarginFactors {
-    float direction = 0x1p-19f; // 32 u, u = 2^-24
+    float direction = 0x1p-18f; // 64 u, u = 2^-24
     float volume = 0x1p-17f;    // 128 u
 };
+
+/// What the placement of corners in float costs, of the lanes' unit: 24 u.
+inline constexpr float kPlacementError = 0x1.8p-20f;
 
 /// A bit a lane. Neither: not known.
 struct LaneVerdicts {

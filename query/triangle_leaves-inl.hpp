@@ -1,10 +1,11 @@
 // All pairs of triangles of two leaves, packed densely into lanes. Compiled once an instruction set.
 //
-// Corners are computed in double, from A's first corner, and rounded to float once, scaled by the power of two that
-// brings the greatest coordinate into [1/2, 1): so the float tests lose digits in proportion to the leaves and what
-// lies between them, not to the bodies. Pairs are counted through blocks of eight triangles of each, and lanes are
-// picked by index: pair p of n triangles of A and some of B is (p mod n, p / n). So no lane but the last few is idle,
-// whatever the counts.
+// A's corners are taken from its first corner, B's from its own first, turned, and moved by what lies between the two,
+// which is computed in double; then all are scaled by the power of two that brings the greatest coordinate into
+// [1/2, 1). So the float tests lose digits in proportion to the leaves and what lies between them, not to the bodies
+// (how many: triangle_lanes-inl.hpp). Pairs are counted through blocks of eight triangles of each, and lanes are picked
+// by index: pair p of n triangles of A and some of B is (p mod n, p / n). So no lane but the last few is idle, whatever
+// the counts.
 #if defined(PROLATE_QUERY_TRIANGLE_LEAVES_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef PROLATE_QUERY_TRIANGLE_LEAVES_INL
 #undef PROLATE_QUERY_TRIANGLE_LEAVES_INL
@@ -15,10 +16,19 @@
 #include "query/triangle_lanes-inl.hpp"
 #include "src/bytes.hpp"
 
+#include <glm/geometric.hpp>
+
+#include <algorithm>
 #include <bit>
+#include <cstring>
 
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
+
+// Vectors of four: most leaves have no more triangles. Nothing is read by longer vectors than it was written by, for that
+// must wait until the writes have reached the cache.
+using QuadTag = HWY_CAPPED(float, 4);
+using Quad = hn::Vec<QuadTag>;
 
 // The triangles of a leaf, one a lane; row 3 i + k is coordinate k of corner i. Rows are a little longer than needed:
 // so that whole vectors can be read and written, and so that they do not fall on the same places of the cache.
@@ -29,92 +39,92 @@ public:
             gather<uint16_t>(tree, range);
         else
             gather<uint32_t>(tree, range);
-        for (size_t row = 0; row < 9; ++row) // whole vectors
-            for (uint32_t t = count_; t % kDoubleLanes != 0; ++t) stored_[row][t] = stored_[row][count_ - 1];
+        for (size_t k = 0; k < 3; ++k) origin_[k] = rows_[k][0];
     }
+    glm::dvec3 first_corner() const { return {origin_[0], origin_[1], origin_[2]}; }
 
-    /// Places the corners at rotation x + translation: the columns of a matrix, and a vector.
-    void place(const glm::dmat3& rotation, const glm::dvec3& translation) {
+    /// Places the corners by x - first corner. Each lane of the result is the greatest of some of the coordinates.
+    Quad place() {
+        Quad most = hn::Zero(QuadTag());
+        for (uint32_t t = 0; t < count_; t += step())
+            for (size_t row = 0; row < 9; ++row) most = hn::Max(most, set(row, t, from_first(row, t)));
+        return most;
+    }
+    /// Likewise by rotation (x - first corner) + shift.
+    Quad place(const glm::dmat3& rotation, const glm::dvec3& shift) {
+        Quad most = hn::Zero(QuadTag());
+        const auto rounded = [](double x) { return hn::Set(QuadTag(), static_cast<float>(x)); };
         for (uint32_t t = 0; t < count_; t += step())
             for (size_t corner = 0; corner < 9; corner += 3) {
-                const DoubleLane x = stored(corner, t), y = stored(corner + 1, t), z = stored(corner + 2, t);
+                const Quad x = from_first(corner, t), y = from_first(corner + 1, t), z = from_first(corner + 2, t);
                 for (glm::length_t k = 0; k < 3; ++k) {
-                    const auto times = [&](glm::length_t column, DoubleLane v) {
-                        return hn::Mul(hn::Set(DoubleTag(), rotation[column][k]), v);
+                    const auto times = [&](glm::length_t column, Quad v) {
+                        return hn::Mul(rounded(rotation[column][k]), v);
                     };
-                    const DoubleLane turned = hn::Add(hn::Add(times(0, x), times(1, y)), times(2, z));
-                    set_placed(corner + static_cast<size_t>(k), t,
-                               hn::Add(turned, hn::Set(DoubleTag(), translation[k])));
+                    const Quad turned = hn::Add(hn::Add(times(0, x), times(1, y)), times(2, z));
+                    most = hn::Max(most, set(corner + static_cast<size_t>(k), t, hn::Add(turned, rounded(shift[k]))));
                 }
             }
+        return most;
     }
-    void place(const glm::dvec3& translation) {
+    void scale(float scale) {
         for (uint32_t t = 0; t < count_; t += step())
             for (size_t row = 0; row < 9; ++row)
-                set_placed(
-                    row, t,
-                    hn::Add(stored(row, t), hn::Set(DoubleTag(), translation[static_cast<glm::length_t>(row % 3)])));
+                hn::Store(hn::Mul(at(row, t), hn::Set(QuadTag(), scale)), QuadTag(), rows_[row] + t);
     }
-    /// The greatest coordinate of a placed corner.
-    double largest() const {
-        return greatest([&](size_t row, uint32_t t) { return hn::LoadU(DoubleTag(), placed_[row] + t); });
-    }
-    /// No corner is farther from the body's origin: the diagonal of a cube.
-    double reach() const {
-        return 1.7321 * greatest([&](size_t row, uint32_t t) { return stored(row, t); });
-    }
-    glm::dvec3 first_corner() const { return {stored_[0][0], stored_[1][0], stored_[2][0]}; }
-
-    /// Rounds the placed corners, times `scale`, to floats.
-    void scale(double scale) {
-        for (uint32_t t = 0; t < count_; t += step())
-            for (size_t row = 0; row < 9; ++row) {
-                const DoubleLane x = hn::LoadU(DoubleTag(), placed_[row] + t);
-                hn::StoreU(hn::DemoteTo(HalfTag(), hn::Mul(x, hn::Set(DoubleTag(), scale))), HalfTag(),
-                           scaled_[row] + t);
-            }
-    }
-    const float* row(size_t row) const { return scaled_[row]; }
+    const float* row(size_t row) const { return rows_[row]; }
 
 private:
-    static constexpr size_t kDoubleLanes = 4, kWidth = kMaxLeafTriangles + 1 + kLanes;
-    using DoubleTag = HWY_CAPPED(double, kDoubleLanes);
-    using HalfTag = hn::Rebind<float, DoubleTag>;
-    using DoubleLane = hn::Vec<DoubleTag>;
+    static constexpr size_t kGroup = 4, kWidth = kMaxLeafTriangles + 1 + kLanes + kGroup;
 
-    static uint32_t step() { return static_cast<uint32_t>(hn::Lanes(DoubleTag())); }
+    static uint32_t step() { return static_cast<uint32_t>(hn::Lanes(QuadTag())); }
 
     template <class Index> void gather(const TreeView& tree, const TriangleRange& range) {
         const std::byte* index = tree.triangle_bytes() + size_t{range.first} * 3 * sizeof(Index);
-        for (uint32_t t = 0; t < count_; ++t)
-            for (size_t corner = 0; corner < 9; corner += 3, index += sizeof(Index)) {
-                const std::byte* const v = tree.vertex_bytes() + size_t{load_le<Index>(index)} * 3 * sizeof(float);
-                for (size_t k = 0; k < 3; ++k) stored_[corner + k][t] = load_le<float>(v + k * sizeof(float));
-            }
+        for (uint32_t t = 0; t < count_; t += kGroup) {
+            alignas(16) float corner[3][kGroup][4] = {}; // the fourth coordinate means nothing
+            for (size_t i = 0; i < kGroup && t + i < count_; ++i)
+                for (auto& of_all : corner) { // behind the vertices there are at least the 6 bytes of a triangle
+                    std::memcpy(of_all[i], tree.vertex_bytes() + size_t{load_le<Index>(index)} * 3 * sizeof(float), 16);
+                    index += sizeof(Index);
+                }
+            for (size_t c = 0; c < 3; ++c) transpose(corner[c], 3 * c, t);
+        }
     }
-    DoubleLane stored(size_t row, uint32_t t) const {
-        return hn::PromoteTo(DoubleTag(), hn::LoadU(HalfTag(), stored_[row] + t));
+    void transpose(const float (&corner)[kGroup][4], size_t row, uint32_t t) {
+#if HWY_TARGET == HWY_SCALAR
+        for (size_t k = 0; k < 3; ++k)
+            for (size_t i = 0; i < kGroup; ++i) rows_[row + k][t + i] = corner[i][k];
+#else
+        const QuadTag d;
+        const Quad first = hn::Load(d, corner[0]), second = hn::Load(d, corner[1]), third = hn::Load(d, corner[2]),
+                   fourth = hn::Load(d, corner[3]);
+        const Quad odd = hn::InterleaveLower(d, first, third), even = hn::InterleaveLower(d, second, fourth);
+        hn::Store(hn::InterleaveLower(d, odd, even), d, rows_[row] + t);
+        hn::Store(hn::InterleaveUpper(d, odd, even), d, rows_[row + 1] + t);
+        hn::Store(hn::InterleaveLower(d, hn::InterleaveUpper(d, first, third), hn::InterleaveUpper(d, second, fourth)),
+                  d, rows_[row + 2] + t);
+#endif
     }
-    void set_placed(size_t row, uint32_t t, DoubleLane x) { hn::StoreU(x, DoubleTag(), placed_[row] + t); }
-    template <class At> double greatest(At&& at) const {
-        DoubleLane most = hn::Zero(DoubleTag());
-        for (uint32_t t = 0; t < count_; t += step())
-            for (size_t row = 0; row < 9; ++row) most = hn::Max(most, hn::Abs(at(row, t)));
-        double lanes[kDoubleLanes] = {};
-        hn::StoreU(most, DoubleTag(), lanes);
-        return std::max({lanes[0], lanes[1], lanes[2], lanes[3]});
+    Quad at(size_t row, uint32_t t) const { return hn::Load(QuadTag(), rows_[row] + t); }
+    Quad from_first(size_t row, uint32_t t) const {
+        return hn::Sub(at(row, t), hn::Set(QuadTag(), origin_[row % 3]));
+    }
+    // Returns the sizes of what it stores, 0 in lanes without a triangle.
+    Quad set(size_t row, uint32_t t, Quad x) {
+        hn::Store(x, QuadTag(), rows_[row] + t);
+        return hn::IfThenElseZero(hn::FirstN(QuadTag(), count_ - t), hn::Abs(x));
     }
 
     uint32_t count_;
-    float stored_[9][kWidth];
-    double placed_[9][kWidth];
-    float scaled_[9][kWidth];
+    float origin_[3];
+    alignas(16) float rows_[9][kWidth];
 };
 
 // The power of two that brings x > 0 into [1/2, 1); 0, with which nothing is certified, if there is none.
-inline double unit_scale(double x) {
-    const uint64_t exponent = std::bit_cast<uint64_t>(x) >> 52;
-    return exponent > 0 && exponent < 2045 ? std::bit_cast<double>((2045 - exponent) << 52) : 0;
+inline float unit_scale(float x) {
+    const uint32_t exponent = std::bit_cast<uint32_t>(x) >> 23;
+    return exponent > 0 && exponent < 253 ? std::bit_cast<float>((253 - exponent) << 23) : 0;
 }
 
 inline float rounded_up(double x) {
@@ -153,9 +163,10 @@ struct PairBatch {
                                    hn::Set(IndexTag(), static_cast<int32_t>(size[kSide] - 1)));
         const auto row_at = [&](size_t row) {
             const float* const eight = leaf[kSide]->row(row) + first[kSide];
-            if constexpr (hn::MaxLanes(tag) == kLanes)
-                return hn::TableLookupLanes(hn::LoadU(tag, eight), hn::IndicesFromVec(tag, which));
-            else
+            if constexpr (hn::MaxLanes(tag) == kLanes) {
+                const auto lanes = size[kSide] <= 4 ? hn::LoadDup128(tag, eight) : hn::LoadU(tag, eight);
+                return hn::TableLookupLanes(lanes, hn::IndicesFromVec(tag, which));
+            } else
                 return hn::GatherIndex(tag, eight, which);
         };
         return {
@@ -173,18 +184,21 @@ public:
     LeafPair(const TreeView& a, const TriangleRange& in_a, const TreeView& b, const TriangleRange& in_b,
              const RelativePose& b_to_a)
         : a_(a, in_a), b_(b, in_b), count_a_(in_a.count), count_b_(in_b.count) {
-        const glm::dvec3 origin = a_.first_corner();
-        a_.place(-origin), b_.place(b_to_a.rotation, b_to_a.translation - origin);
-        scale_ = unit_scale(std::max(a_.largest(), b_.largest()));
+        const glm::dvec3 first_a = a_.first_corner(), first_b = b_.first_corner();
+        const glm::dvec3 shift = b_to_a.rotation * first_b + (b_to_a.translation - first_a);
+        const float largest =
+            hn::GetLane(hn::MaxOfLanes(QuadTag(), hn::Max(a_.place(), b_.place(b_to_a.rotation, shift))));
+        scale_ = unit_scale(largest);
         a_.scale(scale_), b_.scale(scale_);
-        reach_ = a_.reach() + b_.reach() + b_to_a.distance;
+        // Corners are no farther from the bodies' origins than the first ones and what lies between: the diagonals of
+        // cubes of `largest` and twice that.
+        reach_ = glm::length(first_a) + glm::length(first_b) + kDiagonals * double{largest} + b_to_a.distance;
     }
-    /// Lanes' units in a metre; 0 if there is none.
-    double scale() const { return scale_; }
     LaneMargins margins(double distance, const LaneMarginFactors& factors) const {
-        return {.direction = rounded_up(factors.direction + kSeparationMargin * reach_ * scale_),
-                .corner_error = rounded_up(0x1p-24 + 80 * 0x1p-53 * reach_ * scale_),
-                .distance = rounded_up(distance * scale_)};
+        const double scale = scale_;
+        return {.direction = rounded_up(factors.direction + kSeparationMargin * reach_ * scale),
+                .corner_error = rounded_up(kPlacementError + 80 * 0x1p-53 * reach_ * scale),
+                .distance = rounded_up(distance * scale)};
     }
     /// Calls visit(PairBatch) for all pairs, in the order of test_leaves(), until it returns true.
     template <class Visit> void any_batch(Visit&& visit) const {
@@ -206,9 +220,11 @@ public:
     }
 
 private:
+    static constexpr double kDiagonals = 3 * 1.7321;
     LeafRows a_, b_;
     uint32_t count_a_, count_b_;
-    double scale_, reach_;
+    float scale_;
+    double reach_;
 };
 
 inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
