@@ -39,8 +39,8 @@ constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2, kLeaves = 4;
 template <bool kMargin> class Search {
 public:
     explicit Search(Descent& descent)
-        : d_(descent), stack_(descent.stack), sides_{{descent.a, descent.lattice_b_to_a},
-                                                     {descent.b, descent.lattice_a_to_b}} {}
+        : d_(descent),
+          stack_(descent.stack), sides_{{descent.a, descent.lattice_b_to_a}, {descent.b, descent.lattice_a_to_b}} {}
 
     Verdict run() {
         const Verdict verdict = search();
@@ -54,7 +54,7 @@ private:
     struct Side {
         Side(const Body& body, const LatticePose& other_to_here)
             : blocks(body.tree.block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
-              limit_from(body.limit_from), pose(other_to_here), per_step(std::ldexp(1.0, -step_exponent)) {}
+              limit_from(body.limit_from), pose(other_to_here), per_step(power_of_two(-step_exponent)) {}
         const std::byte* block(uint32_t slot) const { return blocks + size_t{slot / kBlockLanes} * kBlockBytes; }
 
         const std::byte* blocks;
@@ -99,7 +99,8 @@ private:
 
     uint64_t budget() const { return d_.options.max_pair_tests - pair_tests_; }
 
-    // One block, B's if kOpenB is given, against a node of the other tree: pushes the pairs that meet, the deepest last.
+    // One block, B's if kOpenB is given, against a node of the other tree: pushes the pairs that meet, the deepest
+    // last.
     HWY_INLINE void test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
         const LaneTag d;
         Side& side = sides_[open];

@@ -45,8 +45,8 @@ class Search {
 
 public:
     explicit Search(DistanceSearch& query)
-        : q_(query), heap_(query.entries), step_a_(std::ldexp(1.0, query.a.lattice.step_exponent)),
-          step_b_(std::ldexp(1.0, query.b.lattice.step_exponent)) {
+        : q_(query), heap_(query.entries), step_a_(power_of_two(query.a.lattice.step_exponent)),
+          step_b_(power_of_two(query.b.lattice.step_exponent)) {
         const auto children = [](const TreeView& tree) { return uint64_t{tree.degree()} * (tree.level_count() - 1); };
         room_ = static_cast<uint32_t>(QueryContext::kEntries - kMaxDegree - children(q_.a.tree) - children(q_.b.tree));
     }

@@ -1,6 +1,11 @@
 #include "query/enclosure.hpp"
 
 #include "query/inside.hpp"
+#include "query/lattice.hpp"
+#include "src/block.hpp"
+#include "src/bytes.hpp"
+
+#include <glm/vector_relational.hpp>
 
 namespace prolate::query {
 namespace {
@@ -22,15 +27,32 @@ public:
     }
 
 private:
-    // A surface in one piece lies inside wholly or not at all: it does not if one of its vertices is outside the root,
-    // which holds all that the surface of `outer` encloses. A few, spread over it, mostly save the ray.
+    // A surface in one piece lies inside wholly or not at all: it does not if one of its vertices is outside the root's
+    // box, which holds all that the surface of `outer` encloses. A few, spread over it, mostly save the ray.
     bool a_sample_is_outside() const {
         constexpr uint32_t kSamples = 8;
         if (inner_.component_count() != 1) return false;
-        const PlacedEllipsoid root = place(outer_.ellipsoid(0));
+        const LatticeInfo lattice = outer_.lattice();
+        const double step = power_of_two(lattice.step_exponent);
+        const std::byte* const block = outer_.block(0);
+        glm::dvec3 low, high; // metres, exact
+        for (size_t i = 0; i < 3; ++i) {
+            const double origin =
+                static_cast<double>(lattice.origin[i]) + load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
+            const double box_step = power_of_two(load_le<uint8_t>(block + kBlockBoxExponent + i));
+            const auto corner = [&](size_t array) {
+                return (origin + load_le<uint8_t>(block + array + kBlockLanes * i) * box_step) * step;
+            };
+            low[static_cast<glm::length_t>(i)] = corner(kBlockBoxLow);
+            high[static_cast<glm::length_t>(i)] = corner(kBlockBoxHigh);
+        }
         for (uint32_t i = 0; i < kSamples; ++i) {
             const auto v = static_cast<uint32_t>(uint64_t{inner_.vertex_count()} * i / kSamples);
-            if (outside(root, place(inner_.vertex(v), to_outer_))) return true;
+            const PlacedPoint p = place(inner_.vertex(v), to_outer_);
+            const glm::dvec3 slack(kSeparationMargin * p.reach);
+            if (glm::any(glm::lessThan(p.position, low - slack)) ||
+                glm::any(glm::greaterThan(p.position, high + slack)))
+                return true;
         }
         return false;
     }

@@ -10,7 +10,6 @@
 #include "src/bytes.hpp"
 
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -142,14 +141,6 @@ using glm::dvec3;
 PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept {
     const dvec3 exact{p.x, p.y, p.z};
     return {to_frame.rotation * exact + to_frame.translation, glm::length(exact) + to_frame.distance};
-}
-
-bool outside(const PlacedEllipsoid& e, const PlacedPoint& point) noexcept {
-    // Seen where the ellipsoid is the unit ball, the point itself is the direction: n = L^-T L^-1 d.
-    const dvec3 d = point.position - e.center;
-    const glm::dmat3 to_ball = glm::inverse(e.factor);
-    const dvec3 n = (to_ball * d) * to_ball;
-    return glm::dot(n, d) - glm::length(n * e.factor) > kSeparationMargin * glm::length(n) * (e.reach + point.reach);
 }
 
 HWY_EXPORT(winding_number_target);

@@ -28,9 +28,6 @@ struct PlacedPoint {
 };
 PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept;
 
-/// True only if the point lies outside the ellipsoid: a plane between them, as in separation.hpp.
-bool outside(const PlacedEllipsoid& e, const PlacedPoint& point) noexcept;
-
 /// Winding number of the surface of `tree`, which has triangles and is closed, around the point. Counts in `stats`;
 /// empty if stats.pair_tests would exceed `most_tests`.
 std::optional<int64_t> winding_number(const TreeView& tree, const PlacedPoint& point, QueryStats& stats,

@@ -122,18 +122,18 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     const hn::FixedTag<uint8_t, 16> d8;
     // The node as stored, each number of the factor in all four components.
     const int32_t exponent = load_le<int8_t>(block + kBlockExponent + lane) - (16 + pose.exponent_from);
-    const auto one = hn::Set(d, std::bit_cast<float>((std::clamp(exponent, kLowestExponent, kHighestExponent) + 127)
-                                                     << 23));
+    const auto one =
+        hn::Set(d, std::bit_cast<float>((std::clamp(exponent, kLowestExponent, kHighestExponent) + 127) << 23));
     const auto two = hn::Add(one, one); // off-diagonal integers count twice as much
     const auto diagonal = [&](size_t row) {
-        const auto twice = hn::Set(hn::FixedTag<uint16_t, 8>(),
-                                   load_le<uint16_t>(block + block_offset(kBlockDiagonal, row, lane)));
+        const auto twice =
+            hn::Set(hn::FixedTag<uint16_t, 8>(), load_le<uint16_t>(block + block_offset(kBlockDiagonal, row, lane)));
         const auto stored = hn::ShiftRight<16>(hn::BitCast(hn::FixedTag<uint32_t, 4>(), twice));
         return hn::Mul(hn::ConvertTo(d, hn::BitCast(d32, stored)), one);
     };
     const auto off_diagonal = [&](size_t row) {
-        const auto twice = hn::Set(hn::FixedTag<int16_t, 8>(),
-                                   load_le<int16_t>(block + block_offset(kBlockOffDiagonal, row, lane)));
+        const auto twice =
+            hn::Set(hn::FixedTag<int16_t, 8>(), load_le<int16_t>(block + block_offset(kBlockOffDiagonal, row, lane)));
         return hn::Mul(hn::ConvertTo(d, hn::ShiftRight<16>(hn::BitCast(d32, twice))), two);
     };
     const auto l21 = off_diagonal(0), l31 = off_diagonal(1), l32 = off_diagonal(2);
@@ -170,16 +170,15 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
 
     const auto size = hn::Sqrt(sum_of_three(squares));
     s.size = hn::GetLane(size), s.weight = hn::GetLane(hn::Div(hn::Set(d, 1), size));
-    const auto slack = hn::Broadcast<0>(hn::Add(
-        hn::Mul(hn::Set(d, kLaneMargin), hn::Add(sum_of_three(hn::Abs(center)), size)), hn::Set(d, common_slack(pose.reach))));
+    const auto slack =
+        hn::Broadcast<0>(hn::Add(hn::Mul(hn::Set(d, kLaneMargin), hn::Add(sum_of_three(hn::Abs(center)), size)),
+                                 hn::Set(d, common_slack(pose.reach))));
     s.slack = hn::GetLane(slack), s.reach = pose.reach;
     const auto half_ellipsoid = hn::Add(hn::Sqrt(squares), slack);
     const auto low = hn::Sub(center, half_ellipsoid), high = hn::Add(center, half_ellipsoid);
 
     // The box: its corners' bytes stand eight apart in a row.
-    const auto load = [&](size_t offset) {
-        return hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + offset));
-    };
+    const auto load = [&](size_t offset) { return hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + offset)); };
     constexpr uint8_t o = 0x80; // gives a zero
     alignas(16) static constexpr uint8_t kTwoRows[] = {0, o, o, o, 8, o, o, o, o, o, o, o, o, o, o, o};
     alignas(16) static constexpr uint8_t kLastRow[] = {o, o, o, o, o, o, o, o, 8, o, o, o, o, o, o, o};
@@ -191,16 +190,16 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     };
     const auto box_low = corner(kBlockBoxLow), box_high = corner(kBlockBoxHigh);
     const hn::Rebind<uint8_t, decltype(d32)> four;
-    const auto box_exponent = hn::PromoteTo(
-        d32, hn::LoadU(four, reinterpret_cast<const uint8_t*>(block + kBlockBoxExponent)));
+    const auto box_exponent =
+        hn::PromoteTo(d32, hn::LoadU(four, reinterpret_cast<const uint8_t*>(block + kBlockBoxExponent)));
     const auto half_step = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(box_exponent, hn::Set(d32, 126))));
     const auto origin = hn::ConvertTo(d, hn::BitCast(d32, load(kBlockBoxOrigin)));
     const auto box_center = hn::Add(origin, hn::Mul(hn::ConvertTo(d, hn::Add(box_low, box_high)), half_step));
     const auto away = hn::Sub(box_center, hn::ConvertTo(d, stored_center));
     const auto half = hn::Add(hn::Mul(hn::ConvertTo(d, hn::Sub(box_high, box_low)), half_step),
                               hn::Add(hn::Mul(hn::Set(d, kBoxMargin), hn::Abs(box_center)), hn::Set(d, kBoxSlack)));
-    const auto at = hn::Add(
-        center, along(r0, r1, r2, hn::Broadcast<0>(away), hn::Broadcast<1>(away), hn::Broadcast<2>(away)));
+    const auto at =
+        hn::Add(center, along(r0, r1, r2, hn::Broadcast<0>(away), hn::Broadcast<1>(away), hn::Broadcast<2>(away)));
     const auto half_box = hn::Add(slack, along(hn::Abs(r0), hn::Abs(r1), hn::Abs(r2), hn::Broadcast<0>(half),
                                                hn::Broadcast<1>(half), hn::Broadcast<2>(half)));
     const auto from = hn::Sub(at, half_box), to = hn::Add(at, half_box);
@@ -214,8 +213,7 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
 HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float margin) {
 #if HWY_TARGET == HWY_SCALAR
     uint32_t meet = 0;
-    for (uint32_t lane = 0; lane < kBlockLanes; ++lane)
-        meet |= uint32_t{!boxes_apart(block, lane, s, margin)} << lane;
+    for (uint32_t lane = 0; lane < kBlockLanes; ++lane) meet |= uint32_t{!boxes_apart(block, lane, s, margin)} << lane;
     return meet;
 #else
     // Along an axis, a lane's box meets the single's if its upper end is at least `least` and its lower end at most
@@ -224,17 +222,17 @@ HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float ma
     const hn::FixedTag<float, 4> d;
     const hn::FixedTag<int32_t, 4> d32;
     const hn::Rebind<uint8_t, decltype(d32)> four;
-    const auto exponent = hn::PromoteTo(
-        d32, hn::LoadU(four, reinterpret_cast<const uint8_t*>(block + kBlockBoxExponent)));
+    const auto exponent =
+        hn::PromoteTo(d32, hn::LoadU(four, reinterpret_cast<const uint8_t*>(block + kBlockBoxExponent)));
     const auto per_step = hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(hn::Set(d32, 127), exponent)));
     const hn::FixedTag<uint8_t, 16> d8;
-    const auto origin = hn::ConvertTo(
-        d, hn::BitCast(d32, hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + kBlockBoxOrigin))));
+    const auto origin =
+        hn::ConvertTo(d, hn::BitCast(d32, hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + kBlockBoxOrigin))));
     const auto inflation = hn::Set(d, margin), zero = hn::Zero(d), last = hn::Set(d, 255);
     const auto low = hn::Mul(hn::Sub(hn::Sub(hn::Load(d, s.low), inflation), origin), per_step);
     const auto high = hn::Mul(hn::Sub(hn::Add(hn::Load(d, s.high), inflation), origin), per_step);
-    const auto least = hn::Min(hn::IfThenElse(hn::Gt(low, zero), hn::Add(low, hn::Set(d, kAlmostOne)), zero),
-                               hn::Set(d, 256));
+    const auto least =
+        hn::Min(hn::IfThenElse(hn::Gt(low, zero), hn::Add(low, hn::Set(d, kAlmostOne)), zero), hn::Set(d, 256));
     const auto most = hn::Max(hn::IfThenElse(hn::Lt(high, last), high, last), hn::Set(d, -1));
     const hn::FixedTag<int16_t, kBlockLanes> d16;
     const hn::Rebind<uint8_t, decltype(d16)> eight;
@@ -247,8 +245,8 @@ HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float ma
     };
     const auto apart = [&](size_t i) {
         const auto ends = [&](size_t array) {
-            return hn::PromoteTo(
-                d16, hn::LoadU(eight, reinterpret_cast<const uint8_t*>(block + array + kBlockLanes * i)));
+            return hn::PromoteTo(d16,
+                                 hn::LoadU(eight, reinterpret_cast<const uint8_t*>(block + array + kBlockLanes * i)));
         };
         return hn::Or(hn::Gt(bound(least, i), ends(kBlockBoxHigh)), hn::Gt(ends(kBlockBoxLow), bound(most, i)));
     };

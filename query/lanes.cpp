@@ -80,7 +80,7 @@ Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noe
 }
 
 Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexcept {
-    const double per_step = std::ldexp(1.0, -lattice.step_exponent);
+    const double per_step = power_of_two(-lattice.step_exponent);
     Single s{};
     double reach = ellipsoid.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {

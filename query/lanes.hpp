@@ -29,12 +29,12 @@ inline constexpr float kAlmostOne = 1 - 0x1p-10f;
 /// An ellipsoid in the lattice coordinates of the block it is tested against. Vectors have a fourth component, which
 /// kernels carry along: of columns, it repeats the first; of boxes, it means nothing.
 struct Single {
-    alignas(32) double exact[4];      ///< the center before it was rounded to float
+    alignas(32) double exact[4]; ///< the center before it was rounded to float
     alignas(16) float center[4];
-    alignas(16) float factor[3][4];   ///< L1, columns
-    alignas(16) float diagonal[4];    ///< of Q1 = L1 L1^T: xx, yy, zz
+    alignas(16) float factor[3][4];    ///< L1, columns
+    alignas(16) float diagonal[4];     ///< of Q1 = L1 L1^T: xx, yy, zz
     alignas(16) float off_diagonal[4]; ///< xy, yz, zx
-    alignas(16) float low[4];         ///< its box in these coordinates, outward rounded
+    alignas(16) float low[4];          ///< its box in these coordinates, outward rounded
     alignas(16) float high[4];
     float size;   ///< |L1|
     float weight; ///< 1 / size

@@ -26,7 +26,7 @@ float slack_of(const float origin[3], const float span[3], double reach) {
 } // namespace
 
 LatticePoint lattice_point(const PlacedPoint& point, const LatticeInfo& lattice) noexcept {
-    const double per_step = std::ldexp(1.0, -lattice.step_exponent);
+    const double per_step = power_of_two(-lattice.step_exponent);
     LatticePoint out{};
     double reach = point.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {

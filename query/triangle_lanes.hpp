@@ -43,8 +43,8 @@ struct LeafResult {
     uint32_t triangle_a = 0, triangle_b = 0;  // the first such two
     uint32_t pair_tests = 0, exact_tests = 0; // pairs up to these, and those of them that took the scalar test
 };
-/// Both trees have triangles, the ranges are not empty. Pairs are taken in the order of B's triangles, and of A's for
-/// each, but of A's only eight at a time. `distance` >= 0.
+/// Both trees have triangles, the ranges are not empty. Pairs are taken by fours of A's triangles, and for each by
+/// fours of B's; among these in the order of B's, and of A's for each. `distance` >= 0.
 LeafResult test_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                        const RelativePose& b_to_a, double distance = 0, const LaneMarginFactors& factors = {}) noexcept;
 
