@@ -10,14 +10,14 @@
 //
 // Which binary nodes become nodes of the tree is then chosen at once for the whole tree, by dynamic programming
 // (Ylitie, Karras and Laine 2017, section 3.1): the sum of w^2 over the inner nodes, each of which costs a query one
-// test of a block of children, plus (kLeafCost + n kTriangleCost) w^2 over the leaves. So lanes of a block stay empty, and
-// leaves hold several triangles, only where that costs less than another block.
+// test of a block of children, plus (kLeafCost + n kTriangleCost) w^2 over the leaves. So lanes of a block stay empty,
+// and leaves hold several triangles, only where that costs less than another block.
 //
 // Instructions of a query near contact, horse-horse / homer-homer / knight-knight / bunny-bunny: 25.0 / 31.4 / 31.5 /
 // 30.1 thousand; with parts opened by largest cost until a node is full or they fit leaves of 4, it was 25.6 / 34.2 /
 // 32.7 / 30.9, and the horse's file 7 % larger. Other measures for w^2 made it no better: surface of the box, other
-// powers and directions, covariances, and the surface of ellipsoids fitted to each candidate (2 % better for three times
-// the time); nor does moving subtrees within the binary tree (3 %).
+// powers and directions, covariances, and the surface of ellipsoids fitted to each candidate (2 % better for three
+// times the time); nor does moving subtrees within the binary tree (3 %).
 //
 // Each node gets a minimum-volume ellipsoid around the corners of its triangles: fitted to their farthest points in the
 // sketch directions (merged from the children's), then refitted with what sticks out.
@@ -52,8 +52,8 @@ constexpr uint32_t kParallelAbove = 512; // triangles of a node whose children a
 // Of a query at a leaf, and for each of its triangles; in tests of a block of children. Pairs of triangles are tested
 // eight at a time, so that a leaf of several costs little more than one of a single triangle.
 constexpr double kLeafCost = 0.7, kTriangleCost = 0.3;
-constexpr int kRounds = 6;               // of refitting a node
-constexpr double kOutside = 1 + 2e-3;    // squared radial coordinate from which a point calls for a refit
+constexpr int kRounds = 6;            // of refitting a node
+constexpr double kOutside = 1 + 2e-3; // squared radial coordinate from which a point calls for a refit
 
 // Extents of points along the axes and face diagonals.
 struct Extents {
@@ -307,7 +307,8 @@ private:
             Halves& node = binary_[i];
             Choice* const choices = &choices_[node.choices];
             const uint32_t size = node.part.size();
-            if (size <= options_.leaf_triangles) choices[0].cost = (kLeafCost + kTriangleCost * size) * node.squared_width;
+            if (size <= options_.leaf_triangles)
+                choices[0].cost = (kLeafCost + kTriangleCost * size) * node.squared_width;
             if (size == 1) continue;
 
             const uint32_t lanes = most_lanes(i), left_most = most_lanes(left_of(i)),

@@ -50,6 +50,12 @@ public:
     }
 
 private:
+    // Nodes that were placed before: every third or so is tested against another block soon.
+    static constexpr uint32_t kPlaced = 8;
+    struct Placed {
+        uint32_t node = UINT32_MAX;
+        Single single;
+    };
     // One of the bodies, as that whose children are tested.
     struct Side {
         Side(const Body& body, const LatticePose& other_to_here)
@@ -62,9 +68,7 @@ private:
         uint32_t leaves_from, limit_from, deepest = 0;
         const LatticePose& pose;
         double per_step;
-        // The other body's node that was placed here last: often it is tested against several blocks in a row.
-        uint32_t placed = UINT32_MAX;
-        Single single;
+        Placed placed[kPlaced]; // of the other body's nodes
     };
 
     Verdict search() {
@@ -107,20 +111,22 @@ private:
         const std::byte* const block = side.block(first);
         pair_tests_ += count, ++block_tests_;
         side.deepest = std::max(side.deepest, first + count - 1);
-        if (side.placed != other) {
-            side.single = place_here(sides_[open ^ kOpenB].block(other), other % kBlockLanes, side.pose);
-            side.placed = other;
+        Placed& placed = side.placed[other % kPlaced];
+        if (placed.node != other) {
+            placed.single = place_here(sides_[open ^ kOpenB].block(other), other % kBlockLanes, side.pose);
+            placed.node = other;
         }
+        const Single& single = placed.single;
         const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
-        uint32_t meet = boxes_meet(block, side.single, lattice_margin) & ((1u << count) - 1);
+        uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
         if (meet == 0) return;
         uint32_t met = 0, larger = 0;
         alignas(32) float depth[kBlockLanes];
         const Lanes margin = hn::Set(d, lattice_margin);
         for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
-            const LaneTerms t = evaluate(load_nodes(block, i, side.step_exponent), side.single);
+            const LaneTerms t = evaluate(load_nodes(block, i, side.step_exponent), single);
             met |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
-            larger |= bits_of(hn::Gt(t.size, hn::Set(d, side.single.size)), i);
+            larger |= bits_of(hn::Gt(t.size, hn::Set(d, single.size)), i);
             hn::StoreU(hn::Div(t.p, t.sum), d, depth + i);
         }
         meet &= met;
