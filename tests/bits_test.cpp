@@ -1,0 +1,180 @@
+// Determinism: the same input gives the same bits on every instruction set and from every compiler. Each kind of query
+// has a known hash of all that it answered in a few hundred scenes. A change that means to alter answers (another order
+// of the descent, say, which names another pair) puts the new number here; no other change may.
+#include "tests/exact_scenes.hpp"
+#include "tests/scenes.hpp"
+#include "tests/shapes.hpp"
+#include "tests/targets.hpp"
+
+#include <prolate/bounds.hpp>
+#include <prolate/collide.hpp>
+#include <prolate/distance.hpp>
+#include <prolate/pairs.hpp>
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+using scenes::Random;
+
+// FNV-1a over 64-bit words.
+class Bits {
+public:
+    template <class T>
+    requires std::is_arithmetic_v<T>
+    void add(T value) {
+        if constexpr (std::is_same_v<T, double>)
+            word(std::bit_cast<uint64_t>(value));
+        else if constexpr (std::is_same_v<T, float>)
+            word(std::bit_cast<uint32_t>(value));
+        else
+            word(static_cast<uint64_t>(value));
+    }
+    void add(Verdict v) { add(static_cast<int>(v)); }
+    void add(const Vec3& v) { add(v.x), add(v.y), add(v.z); }
+    void add(const MeetingPair& p) { add(p.node_a), add(p.node_b), add(p.triangle_a), add(p.triangle_b); }
+    void add(const QueryStats& s) {
+        add(s.pair_tests), add(s.block_tests), add(s.triangle_tests), add(s.deepest_level);
+    }
+    template <class... Ts> void add_all(const Ts&... values) { (add(values), ...); }
+    uint64_t hash() const { return hash_; }
+
+private:
+    void word(uint64_t w) { hash_ = (hash_ ^ w) * 0x100000001b3u; }
+    uint64_t hash_ = 0xcbf29ce484222325u;
+};
+
+// Pairs of bodies near contact: ellipsoids alone, triangles, and one of each.
+struct Scenes {
+    struct Pair {
+        const TreeView a, b;
+        Pose pose_a, pose_b;
+    };
+    std::vector<std::vector<std::byte>> bytes;
+    std::vector<Pair> pairs;
+
+    Scenes() {
+        Random random(77);
+        bytes.push_back(scenes::tree(random, scenes::cloud(random, 4000), {}).bytes);
+        bytes.push_back(
+            scenes::tree(random, scenes::cloud(random, 900), {.degree = 12, .stop_probability = 0.1}).bytes);
+        bytes.push_back(scenes::exact_tree(shapes::torus(1, 0.4f, 64, 24)).bytes);
+        bytes.push_back(scenes::exact_tree(shapes::icosphere(3)).bytes);
+        const auto view = [&](size_t i) { return *TreeView::open(bytes[i]); };
+        for (uint32_t n = 0; n < 320; ++n) {
+            Pair p{view(n % 4), view(n / 4 % 4), {}, {}};
+            p.pose_a = {scenes::to_float(random.in_ball()), random.rotation()};
+            const scenes::Point d = random.direction();
+            const double far = random.in(0.2, 2.4);
+            p.pose_b = {{p.pose_a.translation.x + static_cast<float>(far * d[0]),
+                         p.pose_a.translation.y + static_cast<float>(far * d[1]),
+                         p.pose_a.translation.z + static_cast<float>(far * d[2])},
+                        random.rotation()};
+            pairs.push_back(p);
+        }
+    }
+};
+const Scenes& all_scenes() {
+    static const Scenes out;
+    return out;
+}
+
+// visit(bits, pair) adds the answer of a query. The verdicts must not all be the same.
+template <class Visit> void expect_bits(uint64_t known, Visit&& visit) {
+    targets::for_each([&](const char* target) {
+        Bits bits;
+        for (const Scenes::Pair& pair : all_scenes().pairs) visit(bits, pair);
+        EXPECT_EQ(bits.hash(), known) << target;
+    });
+}
+
+QueryContext& context() {
+    static const auto out = std::make_unique<QueryContext>();
+    return *out;
+}
+
+TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
+    uint32_t separated = 0;
+    for (const auto& [a, b, pose_a, pose_b] : all_scenes().pairs)
+        separated += collide(a, pose_a, b, pose_b, context()).verdict == Verdict::separated;
+    EXPECT_GT(separated, 60u);
+    EXPECT_LT(separated, 260u);
+}
+
+TEST(Bits, Collide) {
+    expect_bits(15459137720688943964u, [](Bits& bits, const Scenes::Pair& p) {
+        const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
+        bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
+        PairCache cache;
+        Pose pose = p.pose_b;
+        for (int step = 0; step < 3; ++step, pose.translation.x += 0.01f) {
+            const CollideResult s = collide(p.a, p.pose_a, p.b, pose, context(), {.margin = 0.01f}, &cache);
+            bits.add_all(s.verdict, s.pair, s.stats, cache.distance);
+        }
+    });
+}
+
+TEST(Bits, CollideAll) {
+    expect_bits(14042971520326213275u, [](Bits& bits, const Scenes::Pair& p) {
+        MeetingPair pairs[16];
+        const CollideAllResult r = collide_all(p.a, p.pose_a, p.b, p.pose_b, pairs, context());
+        bits.add_all(r.verdict, r.enclosed, r.found, r.stats);
+        for (size_t i = 0; i < std::min<uint64_t>(r.found, std::size(pairs)); ++i) bits.add(pairs[i]);
+    });
+}
+
+TEST(Bits, Distance) {
+    expect_bits(17139403808745498815u, [](Bits& bits, const Scenes::Pair& p) {
+        const DistanceResult r = distance(p.a, p.pose_a, p.b, p.pose_b, context());
+        bits.add_all(r.verdict, r.enclosed, r.lower, r.upper, r.point_a, r.point_b, r.normal, r.pair, r.stats);
+    });
+}
+
+TEST(Bits, PairsOfEllipsoids) {
+    expect_bits(11447306084024253018u, [](Bits& bits, const Scenes::Pair& p) {
+        const Ellipsoid a = p.a.ellipsoid(0), b = p.b.ellipsoid(0);
+        const PairDistance d = distance(a, p.pose_a, b, p.pose_b);
+        bits.add_all(collide(a, p.pose_a, b, p.pose_b), d.lower, d.upper, d.normal, d.point_a, d.point_b);
+    });
+}
+
+TEST(Bits, BatchesOfEllipsoids) {
+    targets::for_each([&](const char* target) {
+        std::vector<Ellipsoid> shapes;
+        std::vector<Pose> poses;
+        std::vector<IndexPair> pairs;
+        for (const Scenes::Pair& p : all_scenes().pairs) {
+            const auto n = static_cast<uint32_t>(shapes.size());
+            shapes.push_back(p.a.ellipsoid(0)), shapes.push_back(p.b.ellipsoid(0));
+            poses.push_back(p.pose_a), poses.push_back(p.pose_b);
+            pairs.push_back({n, n + 1});
+        }
+        std::vector<WorldEllipsoid> world(shapes.size());
+        place(shapes, poses, world);
+        std::vector<Verdict> verdicts(pairs.size());
+        std::vector<PairDistance> distances(pairs.size());
+        collide({shapes, poses, world}, pairs, verdicts);
+        distance({shapes, poses, world}, pairs, distances, 1e-3f);
+        Bits bits;
+        for (const Verdict v : verdicts) bits.add(v);
+        for (const PairDistance& d : distances) bits.add_all(d.lower, d.upper, d.normal, d.point_a, d.point_b);
+        EXPECT_EQ(bits.hash(), 15529209860362885327u) << target;
+    });
+}
+
+TEST(Bits, Bounds) {
+    expect_bits(10012597914557111152u, [](Bits& bits, const Scenes::Pair& p) {
+        const Bounds box = bounds(p.a, p.pose_a);
+        bits.add_all(box.lower, box.upper);
+    });
+}
+
+} // namespace
+} // namespace prolate
