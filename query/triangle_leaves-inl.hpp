@@ -71,9 +71,9 @@ public:
     void scale(float scale) {
         for (size_t i = 0; i < kFour; i += step())
             for (size_t row = 0; row < 9; ++row)
-                hn::Store(hn::Mul(at(row, i), hn::Set(QuadTag(), scale)), QuadTag(), rows_[row] + i);
+                hn::Store(hn::Mul(at(row, i), hn::Set(QuadTag(), scale)), QuadTag(), scaled_[row] + i);
     }
-    const float* row(size_t row) const { return rows_[row]; }
+    const float* row(size_t row) const { return scaled_[row]; }
 
 private:
     static size_t step() { return hn::Lanes(QuadTag()); }
@@ -117,7 +117,7 @@ private:
 
     uint32_t count_;
     float origin_[3];
-    alignas(16) float rows_[9][kFour];
+    alignas(16) float rows_[9][kFour], scaled_[9][kFour];
 };
 
 // The power of two that brings x > 0 into [1/2, 1); 0, with which nothing is certified, if there is none.
@@ -160,14 +160,13 @@ HWY_INLINE LaneTriangle pick(const FourTriangles& triangles, const int32_t* inde
     return {{{row_at(0), row_at(1), row_at(2)}, {row_at(3), row_at(4), row_at(5)}, {row_at(6), row_at(7), row_at(8)}}};
 }
 
-/// All pairs of the four, counted in `result`; true at the first that meets.
-inline bool test_fours(const TreeView& a, uint32_t first_a, FourTriangles in_a, const TreeView& b, uint32_t first_b,
-                       FourTriangles in_b, const RelativePose& b_to_a, double distance,
+/// All pairs of the fours, counted in `result`; true at the first that meets. A's are placed, which gave `most`.
+inline bool test_fours(const TreeView& a, uint32_t first_a, FourTriangles& in_a, Quad most, const TreeView& b,
+                       uint32_t first_b, FourTriangles& in_b, const RelativePose& b_to_a, double distance,
                        const LaneMarginFactors& factors, LeafResult& result) {
     const glm::dvec3 corner_a = in_a.first_corner(), corner_b = in_b.first_corner();
     const glm::dvec3 shift = b_to_a.rotation * corner_b + (b_to_a.translation - corner_a);
-    const float largest =
-        hn::GetLane(hn::MaxOfLanes(QuadTag(), hn::Max(in_a.place(), in_b.place(b_to_a.rotation, shift))));
+    const float largest = hn::GetLane(hn::MaxOfLanes(QuadTag(), hn::Max(most, in_b.place(b_to_a.rotation, shift))));
     const float scale = unit_scale(largest);
     in_a.scale(scale), in_b.scale(scale);
     // Corners are no farther from the bodies' origins than the first ones and what lies between: the diagonals of
@@ -207,10 +206,12 @@ inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const Tr
                                  const RelativePose& b_to_a, double distance, const LaneMarginFactors& factors) {
     LeafResult result;
     for (uint32_t i = 0; i < in_a.count; i += kFour) {
-        const FourTriangles four_a(a, in_a.first + i, std::min<uint32_t>(in_a.count - i, kFour));
+        FourTriangles four_a(a, in_a.first + i, std::min<uint32_t>(in_a.count - i, kFour));
+        const Quad most = four_a.place();
         for (uint32_t j = 0; j < in_b.count; j += kFour) {
-            const FourTriangles four_b(b, in_b.first + j, std::min<uint32_t>(in_b.count - j, kFour));
-            if (test_fours(a, in_a.first + i, four_a, b, in_b.first + j, four_b, b_to_a, distance, factors, result))
+            FourTriangles four_b(b, in_b.first + j, std::min<uint32_t>(in_b.count - j, kFour));
+            if (test_fours(a, in_a.first + i, four_a, most, b, in_b.first + j, four_b, b_to_a, distance, factors,
+                           result))
                 return result;
         }
     }
