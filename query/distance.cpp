@@ -22,6 +22,7 @@
 #define HWY_TARGET_INCLUDE "query/distance.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/convert.hpp"
 #include "query/distance_lanes-inl.hpp"
 #include "query/distance_search.hpp"
 #include "query/enclosure.hpp"
@@ -227,9 +228,8 @@ void search(DistanceSearch& query) noexcept {
 namespace prolate {
 namespace {
 
-Vec3 to_float(const glm::dvec3& v) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
+using query::to_float;
+
 MeetingPair swapped(const MeetingPair& pair) {
     return {pair.node_b, pair.node_a, pair.triangle_b, pair.triangle_a};
 }

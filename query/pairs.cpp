@@ -4,6 +4,7 @@
 // its center, |center in double - center in float|, and of its factor. To that comes the error of double itself: the
 // center 37 u |c| + 2 u |c'| for a local center c and a world center c' (separation.hpp), the factor, orthogonalised
 // row by row, at most 128 u |L| (29 u of the rotation; the rest is Gram and Schmidt's backward error, generously).
+#include "query/convert.hpp"
 #include "query/gap.hpp"
 
 #include <prolate/pairs.hpp>
@@ -22,6 +23,7 @@ namespace {
 using glm::dmat3;
 using glm::dvec3;
 using query::PairVerdict;
+using query::to_float;
 
 // Swapped arguments must give the same answer in spite of rounding, so each call works in one fixed order.
 template <size_t Words, class T> bool bits_less(const T& x, const T& y) {
@@ -39,9 +41,6 @@ float round_up(double x) {
 }
 float round_down(double x) {
     return -round_up(-x);
-}
-Vec3 to_float(const dvec3& v) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
 constexpr double kV = 0x1p-24;

@@ -1,5 +1,6 @@
 #include "query/separation.hpp"
 
+#include "query/convert.hpp"
 #include "query/symmetric.hpp"
 
 #include <glm/geometric.hpp>
@@ -18,10 +19,6 @@ using glm::dvec3;
 // Steps in log(rho) are at most log(19); the loop ends when a step can improve f by less than this, relatively.
 constexpr double kLargestStep = 0.9;
 constexpr double kSmallestGain = 0x1p-50;
-
-dvec3 to_double(const Vec3& v) {
-    return {v.x, v.y, v.z};
-}
 
 double frobenius(const dmat3& m) {
     return std::sqrt(glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));

@@ -1,5 +1,6 @@
 #include "query/triangle.hpp"
 
+#include "query/convert.hpp"
 #include "query/triangle_pair.hpp"
 
 #include <glm/geometric.hpp>
@@ -9,16 +10,9 @@
 #include <cmath>
 
 namespace prolate::query {
-namespace {
 
 using glm::dmat3;
 using glm::dvec3;
-
-dvec3 to_double(const Vec3& v) {
-    return {v.x, v.y, v.z};
-}
-
-} // namespace
 
 PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept {
     PlacedTriangle out{};

@@ -1,6 +1,6 @@
 #include "query/triangle_ellipsoid.hpp"
 
-#include "query/symmetric.hpp"
+#include "query/outwards.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -16,7 +16,7 @@ using glm::dmat3;
 using glm::dvec3;
 
 constexpr double kTight = 1 - 0x1p-40; // a lower bound this near to the upper one is good enough
-constexpr int kNewtonSteps = 16, kEdgeSteps = 32;
+constexpr int kEdgeSteps = 32;
 
 class Search {
 public:
@@ -61,23 +61,7 @@ private:
             settles(x, ellipsoid_.factor * u, {1, 0, 0});
             return {0, 0, 0};
         }
-        double t = 0;
-        dvec3 s = x;
-        for (int i = 0; i < kNewtonSteps; ++i) {
-            const dmat3 m = q_ + dmat3(t);
-            const dmat3 adj = adjugate(m);
-            const double det = glm::dot(m[0], adj[0]);
-            if (!(det > 0)) break;
-            s = adj * x / det;
-            const double length = glm::length(s * ellipsoid_.factor);
-            const dvec3 qs = q_ * s;
-            const double fall = glm::dot(qs, adj * s) / det; // -d |L^T s|^2 / dt / 2
-            if (!(fall > 0)) break;
-            const double step = (length - 1) * length * length / fall;
-            t += step;
-            if (!(t > 0) || !(std::abs(step) > 0x1p-50 * t)) break;
-        }
-        return s;
+        return query::outwards(ellipsoid_.factor, q_, x);
     }
     bool at(const dvec3& x, const dvec3& n) { return settles(x, farthest(n), n); }
 

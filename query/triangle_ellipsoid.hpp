@@ -2,9 +2,8 @@
 //
 // The distance of a point x from the ellipsoid {c + L u : |u| <= 1}, Q = L L^T, is convex in x, so its least value on
 // the triangle lies where the face is parallel to the ellipsoid's tangent plane, or on an edge, where its derivative
-// along the edge changes sign: found by regula falsi (Dowell and Jarratt 1971, Illinois). The point nearest to x is
-// c + Q s, s = (Q + t I)^-1 (x - c), for the t > 0 with |L^T s| = 1: Newton's method on 1 / |L^T s|, which is almost
-// linear in t (More and Sorensen 1983, "Computing a trust region step", section 3).
+// along the edge changes sign: found by regula falsi (Dowell and Jarratt 1971, Illinois), the direction of the distance
+// of a point by query/outwards.hpp.
 //
 // Upper bound: the distance of any point of the triangle and any of the ellipsoid. Lower bound: the gap along any
 // direction. Both are wrong by at most 100 u S, by the terms of gap.hpp and triangle.hpp; kSeparationMargin S, 256 u S,

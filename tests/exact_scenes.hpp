@@ -132,6 +132,12 @@ inline ExactScene exact_tree(Mesh mesh, const ExactOptions& options = {}) {
         };
         for_each([&](const Point& p) { scale = std::max(scale, radial(p)); });
         format::PackedNode node;
+        for (size_t i = 0; i < 3; ++i) {
+            double from = HUGE_VAL, to = -HUGE_VAL;
+            for_each([&](const Point& p) { from = std::min(from, p[i]), to = std::max(to, p[i]); });
+            const double shrink = (1 - options.shrink) * (to - from) / 2;
+            node.box_low[i] = from + shrink, node.box_high[i] = to - shrink;
+        }
         for (;; scale *= 1.01) {
             std::array<double, 6> scaled = factor;
             for (double& l : scaled) l *= scale * options.shrink;
