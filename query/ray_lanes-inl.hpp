@@ -23,9 +23,16 @@
 //   g - s d two roundings more:  2 u |n| (|r| + |L| + |E|)
 // With |r| <= |o| + |c| the two sides of (1) are wrong by at most |n| (u (7 |o| + 6 |c| + 9 |L| + 8 |E|) + 2^-43 reach)
 // together, and g is taken kLaneMargin |n|_1 (|o|_1 + |c| + |L|_1 + |E|_1) + 2^-42 |n|_1 reach smaller: 32 u, more than
-// three times as much, which pays for the rounding of the bound itself. Underflow and NaN: as in lanes-inl.hpp.
+// three times as much, which pays for the rounding of the bound itself. Underflow and NaN: as in lanes-inl.hpp. A ray
+// of thickness m takes another m |n| off: m is rounded up by 2^-20, which pays for 6 u m |n| of rounding.
 //
-// Cost: about 50 vector operations and a square root for an axis, 110 with 6 divisions and 2 square roots for a ray.
+// Boxes: the slabs between their sides (Kay and Kajiya 1986). In lattice coordinates a side is exact, and is moved
+// outwards by m + kLaneMargin (|o|_1 + |E|_1 + |c| + |o_i - b_i|) + 2^-42 reach, b_i where the block's box coordinates
+// begin: u |o_i| and u |o_i - b_i| for the rounded origin, 3 u |E_i| for the rounded span and its inverse, and at s <=
+// 1 another 3 u |E_i| for the parameter itself are a fraction of that.
+//
+// Cost: about 50 vector operations and a square root for an axis; for a ray 40 for the boxes, and 110 with 6 divisions
+// and 2 square roots for the ellipsoids.
 #include "query/lanes-inl.hpp"
 #include "query/ray_lanes.hpp"
 
@@ -107,9 +114,34 @@ HWY_INLINE AxisMask axis_block(const std::byte* block, int32_t step_exponent, co
     return mask;
 }
 
+/// Lower bounds of the parameters at which the ray enters the boxes of lanes `first` and following; infinite if it does
+/// not before `limit` <= 1. NaN, which a ray that is not finite makes, is passed over.
+HWY_INLINE Lanes box_entries(const std::byte* block, size_t first, const BoxRay& ray, Lanes limit) {
+    const LaneTag d;
+    const auto side = [&](size_t at) {
+        const hn::Rebind<uint8_t, LaneTag> d8;
+        const auto bytes = hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + at + first));
+        return hn::ConvertTo(d, hn::PromoteTo(hn::Rebind<int32_t, LaneTag>(), bytes));
+    };
+    Lanes enter = hn::Zero(d), leave = limit;
+    for (size_t i = 0; i < 3; ++i) {
+        const Lanes inverse = hn::Set(d, ray.inverse[i]);
+        const Lanes in = hn::Mul(hn::Sub(side(ray.near_side[i]), hn::Set(d, ray.near[i])), inverse);
+        const Lanes out = hn::Mul(hn::Sub(side(ray.far_side[i]), hn::Set(d, ray.far[i])), inverse);
+        enter = hn::IfThenElse(hn::Gt(in, enter), in, enter), leave = hn::IfThenElse(hn::Lt(out, leave), out, leave);
+    }
+    return hn::IfThenElse(hn::Gt(enter, leave), hn::Set(d, std::numeric_limits<float>::infinity()), enter);
+}
+
+/// The ellipsoids, larger by a factor each. Rounding: u |L|, one of the 9 above more.
+HWY_INLINE LaneNodes grown(LaneNodes e, Lanes factor) {
+    for (Lanes* l : {&e.l11, &e.l21, &e.l22, &e.l31, &e.l32, &e.l33}) *l = hn::Mul(*l, factor);
+    return e;
+}
+
 /// Lower bounds of the parameters at which the ray enters the ellipsoids; infinite if certainly not before `limit`
-/// <= 1.
-HWY_INLINE Lanes entry_lanes(const LaneNodes& e, const LatticeRay& ray, Lanes limit) {
+/// <= 1. kThick: ray.thickness is not 0.
+template <bool kThick> HWY_INLINE Lanes entry_lanes(const LaneNodes& e, const LatticeRay& ray, Lanes limit) {
     const LaneTag d;
     const auto set = [d](float value) { return hn::Set(d, value); };
     const Lanes zero = hn::Zero(d), one = set(1), ex = set(ray.span[0]), ey = set(ray.span[1]), ez = set(ray.span[2]);
@@ -144,7 +176,8 @@ HWY_INLINE Lanes entry_lanes(const LaneNodes& e, const LatticeRay& ray, Lanes li
                                                 sum_of_products(e.l22, ny, e.l32, nz), hn::Mul(e.l33, nz)));
     const Lanes length = hn::Add(hn::Add(hn::Abs(nx), hn::Abs(ny)), hn::Abs(nz));
     const Lanes margin = hn::Add(set(ray.slack), hn::Mul(set(kLaneMargin), entry_sum(e)));
-    const Lanes g = hn::Sub(hn::Sub(dot(nx, ny, nz, rx, ry, rz), width), hn::Mul(margin, length));
+    Lanes g = hn::Sub(hn::Sub(dot(nx, ny, nz, rx, ry, rz), width), hn::Mul(margin, length));
+    if constexpr (kThick) g = hn::Sub(g, hn::Mul(set(ray.thickness), hn::Sqrt(sum_of_squares(nx, ny, nz))));
     const Lanes along = dot(nx, ny, nz, ex, ey, ez);
     // Written so that a NaN gives 0, which claims nothing.
     const auto sound = hn::Gt(length, set(kLaneDirection));

@@ -17,6 +17,10 @@ float entry_sum(const LaneNode& e) {
     return e.l11 + e.l22 + e.l33 + (std::abs(e.l21) + std::abs(e.l31) + std::abs(e.l32));
 }
 
+/// Far below the slack, in lattice steps.
+constexpr float kLeastSpan = 0x1p-60f;
+constexpr double kRoundUp = 1 + 0x1p-20; // also pays for the rounding of thickness |n|
+
 float slack_of(const float origin[3], const float span[3], double reach) {
     float lengths = kLargestCenter;
     for (size_t i = 0; i < 3; ++i) lengths += std::abs(origin[i]) + std::abs(span[i]);
@@ -39,10 +43,14 @@ LatticePoint lattice_point(const PlacedPoint& point, const LatticeInfo& lattice)
     return out;
 }
 
-LatticeRay lattice_ray(const double origin[3], const double span[3], double reach) noexcept {
+LatticeRay lattice_ray(const double origin[3], const double span[3], double reach, double thickness) noexcept {
     LatticeRay out{};
-    for (size_t i = 0; i < 3; ++i)
+    for (size_t i = 0; i < 3; ++i) {
         out.origin[i] = static_cast<float>(origin[i]), out.span[i] = static_cast<float>(span[i]);
+        const bool still = std::abs(out.span[i]) < kLeastSpan;
+        out.inverse[i] = 1 / (still ? std::copysign(kLeastSpan, out.span[i]) : out.span[i]);
+    }
+    out.thickness = static_cast<float>(thickness * kRoundUp);
     out.slack = slack_of(out.origin, out.span, reach);
     return out;
 }
@@ -71,6 +79,18 @@ AxisMask axis_mask(const std::byte* block, uint32_t lane, int32_t step_exponent,
     return {!(widened + r[axis] < 0), !(widened - r[axis] < 0)};
 }
 
+float box_entry(const std::byte* block, uint32_t lane, const BoxRay& ray, float limit) noexcept {
+    float enter = 0, leave = limit;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto side = [&](size_t at) { return static_cast<float>(load_le<uint8_t>(block + at + lane)); };
+        const float in = (side(ray.near_side[i]) - ray.near[i]) * ray.inverse[i];
+        const float out = (side(ray.far_side[i]) - ray.far[i]) * ray.inverse[i];
+        if (in > enter) enter = in;
+        if (out < leave) leave = out;
+    }
+    return enter > leave ? std::numeric_limits<float>::infinity() : enter;
+}
+
 float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticeRay& ray,
                 float limit) noexcept {
     const LaneNode e = load_node(block, lane, step_exponent);
@@ -89,7 +109,9 @@ float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, co
     const float width =
         std::sqrt(sum_of_squares(dot(e.l11, e.l21, e.l31, nx, ny, nz), e.l22 * ny + e.l32 * nz, e.l33 * nz));
     const float length = std::abs(nx) + std::abs(ny) + std::abs(nz), margin = ray.slack + kLaneMargin * entry_sum(e);
-    const float g = dot(nx, ny, nz, rx, ry, rz) - width - margin * length, along = dot(nx, ny, nz, s[0], s[1], s[2]);
+    float g = dot(nx, ny, nz, rx, ry, rz) - width - margin * length;
+    if (ray.thickness > 0) g -= ray.thickness * std::sqrt(sum_of_squares(nx, ny, nz));
+    const float along = dot(nx, ny, nz, s[0], s[1], s[2]);
     if (!(length > kLaneDirection && g > 0)) return 0;
     if (g > limit * along) return std::numeric_limits<float>::infinity();
     return along > 0 ? g / along : 0;
