@@ -10,6 +10,8 @@
 #include <prolate/collide.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/pairs.hpp>
+#include <prolate/raycast.hpp>
+#include <prolate/shapes.hpp>
 
 #include <gtest/gtest.h>
 
@@ -109,7 +111,7 @@ TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
 }
 
 TEST(Bits, Collide) {
-    expect_bits(15459137720688943964u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(14174599880938214952u, [](Bits& bits, const Scenes::Pair& p) {
         const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
         PairCache cache;
@@ -122,7 +124,7 @@ TEST(Bits, Collide) {
 }
 
 TEST(Bits, CollideAll) {
-    expect_bits(14042971520326213275u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(63550867226785552u, [](Bits& bits, const Scenes::Pair& p) {
         MeetingPair pairs[16];
         const CollideAllResult r = collide_all(p.a, p.pose_a, p.b, p.pose_b, pairs, context());
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats);
@@ -134,6 +136,31 @@ TEST(Bits, Distance) {
     expect_bits(17139403808745498815u, [](Bits& bits, const Scenes::Pair& p) {
         const DistanceResult r = distance(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.lower, r.upper, r.point_a, r.point_b, r.normal, r.pair, r.stats);
+    });
+}
+
+TEST(Bits, Raycast) {
+    expect_bits(17257544283551249698u, [](Bits& bits, const Scenes::Pair& p) {
+        const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
+        const Ray ray{from, {to.x - from.x, to.y - from.y, to.z - from.z}, 2};
+        for (const float margin : {0.0f, 0.05f}) {
+            const RaycastResult r = raycast(p.b, p.pose_b, ray, context(), {.margin = margin});
+            bits.add_all(r.verdict, r.t, r.clear, r.point, r.normal, r.node, r.triangle, r.stats);
+        }
+    });
+}
+
+TEST(Bits, Overlap) {
+    expect_bits(18209385082411929223u, [](Bits& bits, const Scenes::Pair& p) {
+        const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
+        const auto add = [&](const auto& shape) {
+            const OverlapResult r = overlap(p.b, p.pose_b, shape, context());
+            bits.add_all(r.verdict, r.enclosed, r.node, r.triangle, r.stats);
+        };
+        add(Sphere{from, 0.5f});
+        add(Capsule{from, {(from.x + to.x) / 2, (from.y + to.y) / 2, (from.z + to.z) / 2}, 0.1f});
+        add(Box{p.pose_a, {0.2f, 0.4f, 0.6f}});
+        add(HalfSpace{{to.x - from.x, to.y - from.y, to.z - from.z}, 0.5f});
     });
 }
 
