@@ -196,7 +196,8 @@ Tally hunt_exact(int rounds, int samples, double overshoot = 0) {
     for (int i = 0; i < rounds; ++i) {
         const Solid &a = zoo[random.below(static_cast<uint32_t>(zoo.size()))],
                     &b = zoo[random.below(static_cast<uint32_t>(zoo.size()))];
-        const auto [ma, mb] = motions(random, 1);
+        const auto both = motions(random, 1);
+        const Motion &ma = both.first, &mb = both.second;
         const SweepOptions options{.tolerance = random.log_in(1e-4, 1e-2),
                                    .margin = random.below(2) ? 0.0f : static_cast<float>(random.log_in(1e-3, 0.3))};
         const SweepResult r =
@@ -255,7 +256,8 @@ TEST(Sweep, EllipsoidsNeverMeetBeforeTheCertifiedTime) {
     Tally tally;
     for (int i = 0; i < 200; ++i) {
         const Solid &a = zoo[random.below(8)], &b = zoo[random.below(8)];
-        const auto [ma, mb] = motions(random, 1);
+        const auto both = motions(random, 1);
+        const Motion &ma = both.first, &mb = both.second;
         const SweepOptions options{.tolerance = random.log_in(1e-5, 1e-2)};
         const SweepResult r = ask(a, ma, b, mb, options);
         ++tally.queries, tally.free += r.verdict == Verdict::separated, tally.at_start += r.time_upper == 0;
