@@ -201,7 +201,7 @@ private:
     }
 
     DistanceSearch& q_;
-    PairHeap heap_;
+    PairHeap<> heap_;
     const double step_a_, step_b_; // metres
     double base_ = 0;              // bound of the roots, metres
     uint32_t room_;                // of the heap: what depth_first() needs is kept free

@@ -36,17 +36,18 @@ namespace prolate::query::HWY_NAMESPACE {
 
 using WideTag = hn::CappedTag<double, kBlockLanes>;
 
-/// Of each lane: the bound, in steps of the block's lattice; negative if the ellipsoids overlap as seen along n. Lanes
-/// without a node have NaN.
+/// Of each lane: the bound, in steps of the block's lattice, which is that along n, from the single to the lane;
+/// negative if the ellipsoids overlap as seen along it. Lanes without a node have NaN.
 struct LaneBounds {
     alignas(64) double lower[kBlockLanes];
-    alignas(64) float size[kBlockLanes]; ///< |L2|
+    alignas(64) float x[kBlockLanes], y[kBlockLanes], z[kBlockLanes]; ///< n, of length 1 but for rounding
+    alignas(64) float size[kBlockLanes];                              ///< |L2|
 };
 
 HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const Single& one, LaneBounds& out) {
     const LaneTag d;
     const auto set = [d](float value) { return hn::Set(d, value); };
-    alignas(64) float x[kBlockLanes], y[kBlockLanes], z[kBlockLanes], widths[kBlockLanes];
+    alignas(64) float widths[kBlockLanes];
     alignas(64) float cx[kBlockLanes], cy[kBlockLanes], cz[kBlockLanes];
     for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
         const LaneNodes e = load_nodes(block, i, step_exponent);
@@ -65,7 +66,7 @@ HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const
         n = {hn::Mul(n.x, scale), hn::Mul(n.y, scale), hn::Mul(n.z, scale)};
         const Lanes margin = hn::Mul(set(kLaneMargin), sizes);
         hn::Store(hn::Add(hn::Add(width(one, n), width(e, n)), margin), d, widths + i);
-        hn::Store(n.x, d, x + i), hn::Store(n.y, d, y + i), hn::Store(n.z, d, z + i);
+        hn::Store(n.x, d, out.x + i), hn::Store(n.y, d, out.y + i), hn::Store(n.z, d, out.z + i);
         hn::Store(e.x, d, cx + i), hn::Store(e.y, d, cy + i), hn::Store(e.z, d, cz + i);
         hn::Store(q.size, d, out.size + i);
     }
@@ -74,7 +75,7 @@ HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const
     const double rounding = 0x1p-43 * (one.reach + double{kLargestCenter});
     for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(w)) {
         const auto load = [&](const float* from) { return hn::PromoteTo(w, hn::Load(narrow, from + i)); };
-        const auto nx = load(x), ny = load(y), nz = load(z);
+        const auto nx = load(out.x), ny = load(out.y), nz = load(out.z);
         const auto rx = hn::Sub(load(cx), hn::Set(w, one.exact[0])), ry = hn::Sub(load(cy), hn::Set(w, one.exact[1]));
         const auto rz = hn::Sub(load(cz), hn::Set(w, one.exact[2]));
         const auto sum = [](auto a, auto b, auto c) { return hn::Add(hn::Add(a, b), c); };

@@ -1,5 +1,6 @@
-// A heap of pairs of nodes in the caller's scratch, the least bound on top. Like std::push_heap, but with the same
-// order of equal bounds from every standard library, and four children a node: half the levels to walk down.
+// A heap of pairs of nodes in the caller's scratch, the one that comes first in `Order` (the least bound) on top. Like
+// std::push_heap, but with the same order of equal bounds from every standard library, and four children a node: half
+// the levels to walk down.
 #pragma once
 
 #include <prolate/query.hpp>
@@ -9,7 +10,11 @@
 
 namespace prolate::query {
 
-class PairHeap {
+struct ByBound {
+    static bool before(const QueryContext::Entry& x, const QueryContext::Entry& y) { return x.bound < y.bound; }
+};
+
+template <class Order = ByBound> class PairHeap {
 public:
     using Entry = QueryContext::Entry;
 
@@ -20,7 +25,7 @@ public:
 
     void push(const Entry& entry) {
         uint32_t at = size_++;
-        for (; at > 0 && entry.bound < entries_[(at - 1) / 4].bound; at = (at - 1) / 4)
+        for (; at > 0 && Order::before(entry, entries_[(at - 1) / 4]); at = (at - 1) / 4)
             entries_[at] = entries_[(at - 1) / 4];
         entries_[at] = entry;
     }
@@ -31,8 +36,8 @@ public:
             const uint32_t end = std::min(child + 4, size_);
             uint32_t least = child;
             for (uint32_t c = child + 1; c < end; ++c)
-                if (entries_[c].bound < entries_[least].bound) least = c;
-            if (!(entries_[least].bound < last.bound)) break;
+                if (Order::before(entries_[c], entries_[least])) least = c;
+            if (!Order::before(entries_[least], last)) break;
             entries_[at] = entries_[least];
             at = least;
         }

@@ -12,8 +12,9 @@
 
 namespace prolate::query {
 
-inline bool before(const Pose& x, const Pose& y) {
-    using Bits = std::array<uint32_t, 7>;
+/// Of a Pose or Motion, which are floats throughout.
+template <class Placement> bool before(const Placement& x, const Placement& y) {
+    using Bits = std::array<uint32_t, sizeof(Placement) / sizeof(float)>;
     return std::bit_cast<Bits>(x) < std::bit_cast<Bits>(y);
 }
 inline bool before(const TreeView& x, const TreeView& y) {
@@ -22,8 +23,9 @@ inline bool before(const TreeView& x, const TreeView& y) {
     return p.data() != q.data() && std::memcmp(p.data(), q.data(), p.size()) < 0;
 }
 /// Is body `b` to be taken first?
-inline bool must_swap(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b) {
-    return pose_a == pose_b ? before(b, a) : before(pose_b, pose_a);
+template <class Placement>
+bool must_swap(const TreeView& a, const Placement& place_a, const TreeView& b, const Placement& place_b) {
+    return place_a == place_b ? before(b, a) : before(place_b, place_a);
 }
 
 } // namespace prolate::query

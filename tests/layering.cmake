@@ -22,7 +22,7 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|collide|distance|raycast|shapes|pairs|bounds|jobs|world|glm")
+set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|pairs|bounds|jobs|world|glm")
 set(query_folders "src|query")
 set(query_libraries "glm/.*|hwy/.*")
 

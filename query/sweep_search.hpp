@@ -1,0 +1,77 @@
+// One sweep() query: what the vectorised search (sweep.cpp) and the decisions at its leaves (sweep_leaves.cpp) share.
+#pragma once
+
+#include "query/descent.hpp"
+#include "query/lattice.hpp"
+#include "query/motion.hpp"
+
+#include <prolate/sweep.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <limits>
+
+namespace prolate::query {
+
+/// How all moves at one time, in lattice coordinates of one body, X, whose nodes are opened; Y is the other.
+struct MotionFrame {
+    LatticePose y_to_x;
+    float velocity[3];          ///< of Y's turning point less that of X's
+    float spin_x[3], spin_y[3]; ///< rotation vectors
+    float speed, spin_x_length, spin_y_length;
+    float center_x[3]; ///< the points turned about
+    double center_y[3];
+};
+
+/// Of the present time: a shorter step is none, because an entry of the search does not keep it.
+inline constexpr double kLeastStep = 0x1p-46;
+
+struct SweepSearch {
+    Body a, b;
+    const PairMotion motion;
+    const SweepOptions& options;
+    QueryContext::Entry* const entries;
+    QueryStats stats;
+
+    double target;        ///< pairs are advanced until they are so near, metres: margin and half of the tolerance
+    double reached;       ///< pairs not farther apart meet: margin and tolerance
+    double overshoot = 1; ///< of each step; above 1 it is wrong: so the tests can show that they notice
+
+    double time = -1; ///< what `now` and the frames are of
+    Instant now{};
+    MotionFrame frame_a{}, frame_b{};
+
+    bool roots_meet = true; ///< at the start they may
+    bool complete = false;  ///< no budget ran out
+    double open = 1;        ///< what is left of the search keeps apart until then
+    /// The earliest meeting found, or 1.
+    double horizon = 1;
+    bool found = false;
+    double distance = 0; ///< at the horizon
+    MeetingPair witness;
+    glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0}, normal{0, 0, 0}; ///< then, in A's frame
+
+    SweepSearch(const TreeView& tree_a, const Motion& motion_a, const TreeView& tree_b, const Motion& motion_b,
+                QueryContext& context, const SweepOptions& sweep_options) noexcept;
+
+    void move_to(double t) noexcept;
+
+    /// Time, not before the present one, until which two leaves keep apart, at most `horizon`. If they meet now, takes
+    /// the meeting and returns the present time. `as_covers`: the nodes' ellipsoids stand for what is in them.
+    double advance(uint32_t node_a, uint32_t node_b, bool as_covers) noexcept;
+
+private:
+    template <class X, class Y>
+    bool advance_pair(const X& x, const Y& y, const MeetingPair& pair, glm::dvec3& n, double& least) noexcept;
+    template <class X, class Y>
+    double safe_time(const X& x, const Y& y, const glm::dvec3& n, double limit) const noexcept;
+};
+
+/// Time in which a gap > 0 may close, if it closes by at most rate t + curve t^2 / 2, and by at most most_rate t.
+double closing_time(double gap, double rate, double curve, double most_rate) noexcept;
+
+/// The search itself.
+void search(SweepSearch& query) noexcept;
+
+} // namespace prolate::query
