@@ -69,7 +69,7 @@ struct SweepResult {
 
 /// The first time that `a` and `b` meet, or come as near as the margin. Certified for the motions as they are defined
 /// above, in real numbers: what double precision rounds off is paid for. Symmetric: swapping the bodies swaps the
-/// answer. Thread-safe on shared trees. A tree of its own against the resting world: leave linear and angular 0.
+/// answer. Thread-safe on shared trees. Of a body at rest, leave linear and angular 0.
 ///
 /// Anytime: with a larger max_pair_tests, time_lower never falls. A motion that is not finite, turns by more than
 /// kMaxTurn, or starts with a quaternion of zero leaves everything open: undecided, time_lower = 0.
