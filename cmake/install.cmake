@@ -3,7 +3,7 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS prolate_core prolate_query EXPORT prolate-query-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-set(prolate_headers error.hpp types.hpp tree.hpp query.hpp collide.hpp distance.hpp sweep.hpp pairs.hpp bounds.hpp jobs.hpp world.hpp version.hpp
+set(prolate_headers error.hpp types.hpp tree.hpp query.hpp collide.hpp distance.hpp contacts.hpp sweep.hpp pairs.hpp bounds.hpp jobs.hpp world.hpp version.hpp
   glm.hpp tbb.hpp)
 install(EXPORT prolate-query-targets NAMESPACE prolate::
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)

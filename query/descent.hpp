@@ -35,6 +35,8 @@ struct Descent {
     bool all = false; ///< go on after the first pair
     std::span<MeetingPair> pairs;
     uint64_t found = 0;
+    void (*each)(void* user, const MeetingPair& pair) = nullptr; ///< is handed all pairs taken, if not null
+    void* each_user = nullptr;
 
     /// Nodes are parted only if they are farther apart than options.margin + skin, metres. Leaves that are nearer, but
     /// beyond options.margin, shrink the skin to what they leave; so if the bodies turn out to be separated, they are

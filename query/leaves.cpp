@@ -50,6 +50,7 @@ template <class Apart> bool Descent::parted(Apart&& apart) noexcept {
 }
 
 bool Descent::take(const MeetingPair& pair) noexcept {
+    if (each != nullptr) each(each_user, pair);
     if (found < pairs.size()) pairs[found] = pair;
     ++found;
     return !all;

@@ -3,11 +3,10 @@
 #include "query/triangle_distance.hpp"
 #include "query/triangle_pair.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
-#include <utility>
 
 namespace prolate::query {
 namespace {
@@ -15,107 +14,212 @@ namespace {
 using glm::dvec3;
 using Corners = dvec3[3];
 
-constexpr double kEdgeBias = 0.95; // an edge's product must overlap by less than this share of what a face does
-constexpr double kParallel = 1e-8; // sine of an angle: edges, and planes, that are nearer to parallel are taken for it
-constexpr double kFlat = 1e-10;    // distance from a plane, of the triangles' size: no more than rounding
+constexpr double kEdgeBias = 0.05; // an edge's product must overlap by this share less than a face does
+constexpr double kParallel = 1e-8; // sine of an angle: edges that are nearer to parallel have no product
+constexpr double kFlat = 1e-9;     // of the triangles' size: what counts as touching
+constexpr double kCrossing = 1e-6; // of the triangles' size: what edges may miss each other by
+constexpr double kFacing = 0.9;    // cosine: a face turned farther from a normal is not cut along it
+constexpr double kAskance = 0.3;   // cosine: a face that looks this much the same way as the normal is not in contact
 
 struct Axis {
+    enum class Kind : uint8_t { none, face_a, face_b, edges };
+    Kind kind = Kind::none;
     dvec3 normal{0, 0, 1};
     double depth = std::numeric_limits<double>::infinity();
+    Feature edge_a = 0, edge_b = 0;
 };
 
-Axis least_overlap(const TrianglePair& pair) {
-    Axis best;
-    const auto consider = [&](const dvec3& n, double least_length, double bias) {
-        const double length = glm::length(n);
-        if (!(length > least_length)) return;
-        const auto x = pair.range_a(n), y = pair.range_b(n);
-        const double forward = (x.high - y.low) / length, backward = (y.high - x.low) / length;
-        if (!(std::min(forward, backward) < bias * best.depth)) return;
-        best = forward <= backward ? Axis{n / length, forward} : Axis{-n / length, backward};
-    };
-    consider(pair.normal_a, 0, 1), consider(pair.normal_b, 0, 1);
-    for (const dvec3& d : pair.d)
-        for (const dvec3& e : pair.e)
-            consider(glm::cross(d, e), kParallel * glm::length(d) * glm::length(e), kEdgeBias);
-    if (std::isinf(best.depth)) best.depth = 0; // points, or segments of one direction
-    return best;
+dvec3 unit_or_zero(const dvec3& v) {
+    const double length = glm::length(v);
+    return length > 0 ? v / length : dvec3(0);
 }
 
-using Segment = std::pair<dvec3, dvec3>;
-
-// The part of the triangle in the plane n.(x - y) = 0, if its corners lie on both sides.
-std::optional<Segment> cut(const Corners& corner, const dvec3& y, const dvec3& n) {
-    dvec3 found[3];
-    size_t count = 0;
-    for (size_t i = 0; i < 3; ++i) {
-        const dvec3 &p = corner[i], &q = corner[(i + 1) % 3];
-        const double h = glm::dot(n, p - y), k = glm::dot(n, q - y);
-        if ((h < 0) != (k < 0)) found[count++] = p + h / (h - k) * (q - p);
+class Axes {
+public:
+    Axes(const TrianglePair& pair, bool closed_a, bool closed_b)
+        : pair_(pair), out_a_(closed_a ? unit_or_zero(pair.normal_a) : dvec3(0)),
+          out_b_(closed_b ? unit_or_zero(pair.normal_b) : dvec3(0)) {
+        for (size_t i = 0; i < 3; ++i) size_ = std::max({size_, glm::length(pair.d[i]), glm::length(pair.e[i])});
     }
-    if (count != 2) return std::nullopt;
-    return Segment{found[0], found[1]};
-}
+    double touching() const { return kFlat * size_; }
+    // May B be pushed along n?
+    bool leads_out(const dvec3& n) const { return glm::dot(n, out_a_) >= -kAskance && glm::dot(n, out_b_) <= kAskance; }
 
-std::optional<dvec3> middle_of_crossing(const TrianglePair& pair) {
-    const dvec3 line = glm::cross(pair.normal_a, pair.normal_b);
-    if (!(glm::length(line) > kParallel * glm::length(pair.normal_a) * glm::length(pair.normal_b))) return std::nullopt;
-    auto x = cut(pair.p, pair.q[0], pair.normal_b), y = cut(pair.q, pair.p[0], pair.normal_a);
-    if (!x || !y) return std::nullopt;
-    const auto along = [&](const dvec3& p) { return glm::dot(line, p); };
-    for (Segment* s : {&*x, &*y})
-        if (along(s->first) > along(s->second)) std::swap(s->first, s->second);
-    const dvec3 low = along(x->first) > along(y->first) ? x->first : y->first;
-    const dvec3 high = along(x->second) < along(y->second) ? x->second : y->second;
-    return 0.5 * (low + high);
-}
-
-// Centroid of what two triangles of one plane have in common.
-std::optional<dvec3> centroid_of_overlap(const TrianglePair& pair) {
-    const double length = glm::length(pair.normal_b);
-    const double size = std::max({glm::length(pair.p[1]), glm::length(pair.p[2]), glm::length(pair.q[0]),
-                                  glm::length(pair.q[1]), glm::length(pair.q[2])});
-    if (!(length > 0)) return std::nullopt;
-    for (const dvec3& p : pair.p)
-        if (!(std::abs(glm::dot(pair.normal_b, p - pair.q[0])) <= kFlat * size * length)) return std::nullopt;
-
-    std::array<dvec3, 6> polygon{pair.p[0], pair.p[1], pair.p[2]}; // each of the three cuts adds a corner at most
-    size_t count = 3;
-    for (size_t j = 0; j < 3; ++j) {
-        const dvec3 inward = glm::cross(pair.normal_b, pair.e[j]);
-        std::array<dvec3, 6> kept;
-        size_t kept_count = 0;
-        for (size_t i = 0; i < count; ++i) {
-            const dvec3 &p = polygon[i], &q = polygon[(i + 1) % count];
-            const double h = glm::dot(inward, p - pair.q[j]), k = glm::dot(inward, q - pair.q[j]);
-            if (h >= 0 && kept_count < 6) kept[kept_count++] = p;
-            if ((h < 0) != (k < 0) && kept_count < 6) kept[kept_count++] = p + h / (h - k) * (q - p);
+    Axis least_overlap() {
+        Axis best;
+        for (const double sign : {1.0, -1.0}) {
+            face(best, Axis::Kind::face_a, sign * unit_or_zero(pair_.normal_a));
+            face(best, Axis::Kind::face_b, sign * unit_or_zero(pair_.normal_b));
         }
-        polygon = kept, count = kept_count;
+        const double bias = std::isfinite(best.depth) ? kEdgeBias * std::abs(best.depth) + touching() : 0;
+        for (size_t i = 0; i < 3; ++i)
+            for (size_t j = 0; j < 3; ++j)
+                for (const double sign : {1.0, -1.0})
+                    edges(best, i, j, sign, best.kind == Axis::Kind::edges ? 0 : bias);
+        return best;
     }
-    if (count == 0) return std::nullopt;
-    dvec3 sum{}, mean{};
-    double area = 0;
-    for (size_t i = 0; i < count; ++i) {
-        mean += polygon[i] / static_cast<double>(count);
-        if (i < 2) continue;
-        const double part = glm::length(glm::cross(polygon[i - 1] - polygon[0], polygon[i] - polygon[0]));
-        sum += part / 3 * (polygon[0] + polygon[i - 1] + polygon[i]);
-        area += part;
+
+private:
+    double depth(const dvec3& n) const { return pair_.range_a(n).high - pair_.range_b(n).low; }
+    void face(Axis& best, Axis::Kind kind, const dvec3& n) const {
+        if (n == dvec3(0) || !leads_out(n)) return;
+        const double d = depth(n);
+        if (d < best.depth) best = {kind, n, d};
     }
-    return area > 0 ? sum / area : mean;
+    void edges(Axis& best, size_t i, size_t j, double sign, double bias) const {
+        const dvec3 &d = pair_.d[i], &e = pair_.e[j], product = sign * glm::cross(d, e);
+        const double length = glm::length(product);
+        if (!(length > kParallel * glm::length(d) * glm::length(e))) return;
+        const dvec3 n = product / length;
+        if (!leads_out(n)) return;
+        const double high = pair_.range_a(n).high, low = pair_.range_b(n).low;
+        // Both edges must lie where the triangles are farthest.
+        if (glm::dot(n, pair_.p[i]) < high - touching() || glm::dot(n, pair_.q[j]) > low + touching()) return;
+        if (!(high - low < best.depth - bias)) return;
+        // And cross, as seen along the normal.
+        const auto [s, t] = closest(d, e, pair_.p[i] - pair_.q[j]);
+        const dvec3 between = pair_.p[i] + s * d - (pair_.q[j] + t * e);
+        if (glm::length(between - glm::dot(n, between) * n) > kCrossing * size_) return;
+        best = {Axis::Kind::edges, n, high - low, static_cast<Feature>(kFirstEdge + i),
+                static_cast<Feature>(kFirstEdge + j)};
+    }
+
+    const TrianglePair& pair_;
+    const dvec3 out_a_, out_b_; // outward normals of closed meshes; else 0
+    double size_ = 0;
+};
+
+// A polygon cut out of a triangle. `label`: the edge that leaves the corner, 0 ... 2 of that triangle, 3 ... 5 of the
+// one it is cut with.
+struct Cut {
+    std::array<dvec3, TriangleContact::kPoints> corner;
+    std::array<uint8_t, TriangleContact::kPoints> label;
+    size_t count = 0;
+
+    void add(const dvec3& p, uint8_t edge) {
+        if (count < corner.size()) corner[count] = p, label[count++] = edge;
+    }
+};
+
+// What of the triangle lies over the other, whose normal and corners these are.
+Cut cut(const Corners& triangle, const Corners& other, const Corners& edge, const dvec3& normal) {
+    Cut polygon;
+    for (uint8_t i = 0; i < 3; ++i) polygon.add(triangle[i], i);
+    for (uint8_t j = 0; j < 3; ++j) {
+        const dvec3 inward = glm::cross(normal, edge[j]);
+        Cut kept;
+        for (size_t i = 0; i < polygon.count; ++i) {
+            const dvec3 &p = polygon.corner[i], &q = polygon.corner[(i + 1) % polygon.count];
+            const double h = glm::dot(inward, p - other[j]), k = glm::dot(inward, q - other[j]);
+            if (h >= 0) kept.add(p, polygon.label[i]);
+            if ((h < 0) == (k < 0)) continue;
+            kept.add(p + h / (h - k) * (q - p), h < 0 ? polygon.label[i] : static_cast<uint8_t>(3 + j));
+        }
+        polygon = kept;
+    }
+    return polygon;
 }
+
+// What the corner between two edges of a Cut is: of the triangle that was cut, and of the other.
+struct CutFeatures {
+    Feature of_cut, of_other;
+};
+CutFeatures features(uint8_t before, uint8_t after) {
+    // The corner between edge i - 1 and edge i of three is i.
+    if (before < 3 && after < 3) return {after, kFace};
+    if (before >= 3 && after >= 3) {
+        const auto x = static_cast<uint8_t>(before - 3), y = static_cast<uint8_t>(after - 3);
+        return {kFace, static_cast<uint8_t>((x + 1) % 3 == y ? y : x)};
+    }
+    const uint8_t of_cut = std::min(before, after), other = std::max(before, after);
+    return {static_cast<Feature>(kFirstEdge + of_cut), static_cast<Feature>(kFirstEdge + other - 3)};
+}
+
+// The points of a contact along `out.normal`, from TrianglePair::origin.
+class Points {
+public:
+    Points(const TrianglePair& pair, double margin, TriangleContact& out) : pair_(pair), margin_(margin), out_(out) {}
+
+    void add(const dvec3& x, const dvec3& y, Feature of_a, Feature of_b) {
+        const double depth = glm::dot(out_.normal, x - y);
+        if (depth >= -margin_ && out_.count < TriangleContact::kPoints)
+            out_.points[out_.count++] = {pair_.origin + x, pair_.origin + y, depth, of_a, of_b};
+    }
+    // Of B on the face of A, and of A on the face of B.
+    void on_face_a() {
+        const dvec3& n = out_.normal;
+        on_face(
+            pair_.q, pair_.p, pair_.d, pair_.normal_a,
+            [&](const dvec3& y, const dvec3& over, auto of_b, auto of_a) { add(over, y, of_a, of_b); }, n);
+    }
+    void on_face_b() {
+        const dvec3& n = out_.normal;
+        on_face(
+            pair_.p, pair_.q, pair_.e, pair_.normal_b,
+            [&](const dvec3& x, const dvec3& over, auto of_a, auto of_b) { add(x, over, of_a, of_b); }, n);
+    }
+
+private:
+    template <class Take>
+    static void on_face(const Corners& incident, const Corners& face, const Corners& edge, const dvec3& normal,
+                        Take&& take, const dvec3& n) {
+        const double along = glm::dot(normal, n);
+        const Cut polygon = cut(incident, face, edge, along < 0 ? -n : n);
+        for (size_t i = 0; i < polygon.count; ++i) {
+            const dvec3& x = polygon.corner[i];
+            const auto [of_cut, of_face] =
+                features(polygon.label[(i + polygon.count - 1) % polygon.count], polygon.label[i]);
+            take(x, x + glm::dot(normal, face[0] - x) / along * n, of_cut, of_face);
+        }
+    }
+
+    const TrianglePair& pair_;
+    const double margin_;
+    TriangleContact& out_;
+};
 
 } // namespace
 
-TriangleContact contact(const PlacedTriangle& a, const PlacedTriangle& b) noexcept {
+TriangleContact contact(const PlacedTriangle& a, bool closed_a, const PlacedTriangle& b, bool closed_b,
+                        double margin) noexcept {
     const TrianglePair pair(a, b);
-    const Axis axis = least_overlap(pair);
-    auto point = centroid_of_overlap(pair);
-    if (!point) point = middle_of_crossing(pair);
-    if (point) return {pair.origin + *point, axis.normal, axis.depth};
-    const TriangleDistance closest_points = distance(a, b);
-    return {0.5 * (closest_points.on_a + closest_points.on_b), axis.normal, axis.depth};
+    Axes axes(pair, closed_a, closed_b);
+    const Axis axis = axes.least_overlap();
+    TriangleContact out{};
+    out.normal = axis.normal;
+    Points points(pair, margin + axes.touching(), out);
+    if (axis.kind == Axis::Kind::edges) {
+        const size_t i = axis.edge_a - kFirstEdge, j = axis.edge_b - kFirstEdge;
+        const auto [s, t] = closest(pair.d[i], pair.e[j], pair.p[i] - pair.q[j]);
+        points.add(pair.p[i] + s * pair.d[i], pair.q[j] + t * pair.e[j], axis.edge_a, axis.edge_b);
+    } else if (axis.kind == Axis::Kind::face_a) {
+        points.on_face_a();
+    } else if (axis.kind == Axis::Kind::face_b) {
+        points.on_face_b();
+    }
+    out.faces = axis.kind != Axis::Kind::edges;
+    if (out.count > 0) return out;
+    // Beside each other: the closest points, if they are apart.
+    const TriangleDistance nearest = distance(a, b);
+    const dvec3 between = nearest.on_b - nearest.on_a;
+    const double length = glm::length(between);
+    if (!(nearest.lower > 0) || length > margin || !axes.leads_out(between / length)) return out;
+    out.normal = between / length, out.faces = false, out.count = 1;
+    out.points[0] = {nearest.on_a, nearest.on_b, -length, kFace, kFace};
+    return out;
+}
+
+TriangleContact contact_along(const dvec3& normal, const PlacedTriangle& a, const PlacedTriangle& b,
+                              double margin) noexcept {
+    const TrianglePair pair(a, b);
+    TriangleContact out{};
+    out.normal = normal;
+    const double of_a = std::abs(glm::dot(normal, unit_or_zero(pair.normal_a))),
+                 of_b = std::abs(glm::dot(normal, unit_or_zero(pair.normal_b)));
+    Points points(pair, margin + Axes(pair, false, false).touching(), out);
+    out.faces = std::max(of_a, of_b) > kFacing;
+    if (out.faces) of_a >= of_b ? points.on_face_a() : points.on_face_b();
+    return out;
 }
 
 } // namespace prolate::query

@@ -1,0 +1,418 @@
+// Contact manifolds: all pairs of leaves that meet, as collide_all() finds them, each turned into points with a normal
+// (triangle_contact.hpp, gap.hpp), and all of these into a few manifolds (manifold.hpp).
+//
+// What a pair of triangles says for itself may be wrong: their edges may be internal ones of a flat surface, and a
+// small triangle that stands out of a face by little is parted soonest sideways. So the pairs are gone through twice.
+// The first time for the normals: those of faces make patches, others wait and count if no patch resolves them, that
+// is, unless they are parted once the bodies are moved along its normal as far as that patch needs anyway. Patches all
+// of which another one resolves are dropped. The second time for the points: of each pair along the normal of the first
+// patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
+//
+// Bodies are taken in an order that depends on their trees alone, if these differ: poses change from step to step, and
+// what follows from the order should not.
+//
+// Complexity: twice collide_all()'s, and some microseconds for each pair that meets.
+#include "query/descent.hpp"
+#include "query/enclosure.hpp"
+#include "query/gap.hpp"
+#include "query/manifold.hpp"
+#include "query/order.hpp"
+#include "query/triangle_contact.hpp"
+#include "query/triangle_ellipsoid.hpp"
+
+#include <prolate/contacts.hpp>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace prolate {
+namespace query {
+namespace {
+
+using glm::dvec3;
+
+constexpr double kTolerance = 1e-7;    // of the smaller ellipsoid: how exact depths are
+constexpr double kSamePoint = 1e-4;    // of the smaller body: what is nearer is one point
+constexpr double kSameFace = 0.9;      // cosine: a face turned farther from a normal has no points along it
+constexpr double kSameAsFace = 0.9999; // cosine
+constexpr double kSameNormal =
+    0.8; // cosine: a point of the last query is known again by its id, if its normal is alike
+
+// The finisher of SplitMix64 (Steele, Lea, Flood 2014).
+uint64_t mixed(uint64_t x) {
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    return x ^ (x >> 31);
+}
+
+// What of one body touches, for an id.
+struct Part {
+    enum class Kind : uint32_t { vertex = 1, edge, face, triangle, node } kind;
+    uint32_t first = 0, second = 0;
+};
+uint64_t id_of(const Part& a, const Part& b) {
+    uint64_t h = 0;
+    for (const Part& p : {a, b}) {
+        h = mixed(h + 0x9e3779b97f4a7c15u + static_cast<uint32_t>(p.kind));
+        h = mixed(h ^ (uint64_t{p.first} << 32 | p.second));
+    }
+    return h;
+}
+Part part_of(const TreeView& tree, uint32_t triangle, Feature feature) {
+    const Triangle v = tree.triangle(triangle);
+    if (feature < kFirstEdge) return {Part::Kind::vertex, v[feature]};
+    if (feature == kFace) return {Part::Kind::face};
+    const size_t i = feature - kFirstEdge;
+    const auto [first, second] = std::minmax(v[i], v[(i + 1) % 3]);
+    return {Part::Kind::edge, first, second};
+}
+
+// A way in which a pair touches.
+struct Contact {
+    MeetingPair pair;
+    dvec3 normal, middle;
+    double depth;
+    Part a, b;
+};
+
+class Collector {
+public:
+    Collector(Descent& descent, bool swapped, const ContactManifolds& last, const RelativePose& to_world)
+        : d_(descent), swapped_(swapped), last_(last), closed_a_(closed(descent.a.tree)),
+          closed_b_(closed(descent.b.tree)),
+          size_(std::min(place(d_.a.tree.ellipsoid(0)).size, place(d_.b.tree.ellipsoid(0)).size)),
+          patches_(kSamePoint * size_) {
+        for (uint32_t i = 0; i < std::min(last.count, kManifolds); ++i) {
+            const Vec3& n = last.manifolds[i].normal;
+            const dvec3 here = dvec3(n.x, n.y, n.z) * to_world.rotation; // the transpose times it
+            last_normals_[i] = swapped ? -here : here;
+            patches_.expect(last_normals_[i]);
+        }
+        descent.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
+        descent.each_user = this;
+    }
+    // Between the two passes: settles the normals.
+    void settle() {
+        flush();
+        const Patch* found[kManifolds];
+        const uint32_t count = patches_.sorted(found);
+        bool needed[kManifolds] = {};
+        for (uint32_t i = 0; i < count; ++i) needed[i] = true;
+        for (uint32_t i = count; i-- > 0;) { // the shallowest first
+            for (uint32_t j = 0; j < count && needed[i]; ++j)
+                if (j != i && needed[j])
+                    needed[i] = !std::all_of(found[i]->begin(), found[i]->end(),
+                                             [&](const Candidate& c) { return resolves(*found[j], c.pair); });
+        }
+        for (uint32_t i = 0; i < count; ++i)
+            if (needed[i])
+                way_[ways_] = {found[i]->normal(), found[i]->depth()}, points_[ways_] = Patch(way_[ways_].normal),
+                ++ways_;
+        settled_ = true;
+    }
+    // After both: patches with points, at least one if any pair met.
+    uint32_t patches(const Patch* (&out)[kManifolds]) {
+        uint32_t count = 0;
+        for (uint32_t i = 0; i < ways_; ++i)
+            if (!points_[i].empty()) out[count++] = &points_[i];
+        if (count > 0 || d_.found == 0) return count;
+        const Contact c = last_resort();
+        points_[0] = Patch(c.normal);
+        points_[0].add(c.normal, candidate(c), 0, patches_.apart());
+        out[0] = &points_[0];
+        return 1;
+    }
+    double apart() const { return patches_.apart(); }
+
+private:
+    struct Way {
+        dvec3 normal;
+        double depth;
+    };
+    static bool closed(const TreeView& tree) { return tree.has_triangles() && !tree.surface_mode(); }
+
+    void add(const MeetingPair& pair) {
+        if (!settled_) {
+            if (d_.found == 0) first_ = pair;
+            return own(pair, [&](const Contact& c, bool certain) {
+                if (certain) return take(c);
+                if (waiting_count_ == kWaiting) flush();
+                waiting_[waiting_count_++] = c;
+            });
+        }
+        if (pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle)
+            for (uint32_t i = 0; i < ways_; ++i)
+                if (resolves(way_[i], pair) && along(way_[i].normal, pair, points_[i])) return;
+        own(pair, [&](const Contact& c, bool) {
+            for (uint32_t i = 0; i < ways_; ++i)
+                if (points_[i].takes(c.normal)) return points_[i].add(c.normal, candidate(c), 0, patches_.apart());
+        });
+    }
+
+    // Is the pair parted once the bodies are moved along a patch's normal as far as that patch needs?
+    template <class Of> bool resolves(const Of& patch, const MeetingPair& pair) const {
+        const auto [n, depth] = way_of(patch);
+        const double high =
+            pair.triangle_a != kNoTriangle ? highest(triangle_a(pair), n) : highest(ellipsoid_a(pair), n);
+        const double low =
+            pair.triangle_b != kNoTriangle ? -highest(triangle_b(pair), -n) : -highest(ellipsoid_b(pair), -n);
+        return high - low <= depth + patches_.apart();
+    }
+    static Way way_of(const Patch& patch) { return {patch.normal(), patch.depth()}; }
+    static const Way& way_of(const Way& way) { return way; }
+
+    PlacedTriangle triangle_a(const MeetingPair& pair) const { return place(d_.a.tree, pair.triangle_a); }
+    PlacedTriangle triangle_b(const MeetingPair& pair) const { return place(d_.b.tree, pair.triangle_b, d_.b_to_a); }
+    PlacedEllipsoid ellipsoid_a(const MeetingPair& pair) const { return place(d_.a.tree.ellipsoid(pair.node_a)); }
+    PlacedEllipsoid ellipsoid_b(const MeetingPair& pair) const {
+        return place(d_.b.tree.ellipsoid(pair.node_b), d_.b_to_a);
+    }
+    static Part whole(uint32_t node, uint32_t triangle) {
+        return triangle != kNoTriangle ? Part{Part::Kind::triangle, triangle} : Part{Part::Kind::node, node};
+    }
+    static double highest(const PlacedTriangle& t, const dvec3& n) {
+        return std::max({glm::dot(n, t.corner[0]), glm::dot(n, t.corner[1]), glm::dot(n, t.corner[2])});
+    }
+    static double highest(const PlacedEllipsoid& e, const dvec3& n) {
+        return glm::dot(n, e.center) + glm::length(n * e.factor);
+    }
+
+    // ---- points along the normal of a patch; false if the pair should speak for itself ----
+
+    bool along(const dvec3& n, const MeetingPair& pair, Patch& patch) const {
+        const auto put = [&](const Contact& c) { patch.add(n, candidate(c), 0, patches_.apart()); };
+        if (pair.triangle_a != kNoTriangle && pair.triangle_b != kNoTriangle) {
+            const TriangleContact found = contact_along(n, triangle_a(pair), triangle_b(pair), d_.options.margin);
+            for_each_point(found, pair, put);
+            return found.faces;
+        }
+        const bool in_a = pair.triangle_a != kNoTriangle;
+        const PlacedTriangle t = in_a ? triangle_a(pair) : triangle_b(pair);
+        const PlacedEllipsoid e = in_a ? ellipsoid_b(pair) : ellipsoid_a(pair);
+        const dvec3 up = in_a ? n : -n, w = up * e.factor,
+                    face = glm::cross(t.corner[1] - t.corner[0], t.corner[2] - t.corner[0]);
+        const double facing = glm::dot(face, up);
+        if (!(std::abs(facing) > kSameFace * glm::length(face))) return false;
+        const dvec3 lowest = e.center - e.factor * (w / glm::length(w));
+        const double depth = glm::dot(face, t.corner[0] - lowest) / facing;
+        const dvec3 below = lowest + depth * up;
+        for (size_t i = 0; i < 3; ++i) // what lies beside the triangle is its neighbours'
+            if (glm::dot(face, glm::cross(t.corner[(i + 1) % 3] - t.corner[i], below - t.corner[i])) < 0) return true;
+        if (depth >= -d_.options.margin)
+            put({pair, n, 0.5 * (lowest + below), depth, whole(pair.node_a, pair.triangle_a),
+                 whole(pair.node_b, pair.triangle_b)});
+        return true;
+    }
+    template <class Put> void for_each_point(const TriangleContact& found, const MeetingPair& pair, Put&& put) const {
+        for (uint32_t i = 0; i < found.count; ++i) {
+            const TriangleContact::Point& p = found.points[i];
+            const bool beside = p.of_a == kFace && p.of_b == kFace;
+            const auto part = [beside](const TreeView& tree, uint32_t triangle, Feature feature) {
+                return beside ? whole(0, triangle) : part_of(tree, triangle, feature);
+            };
+            put(Contact{pair, found.normal, 0.5 * (p.on_a + p.on_b), p.depth, part(d_.a.tree, pair.triangle_a, p.of_a),
+                        part(d_.b.tree, pair.triangle_b, p.of_b)});
+        }
+    }
+
+    // ---- what a pair says for itself: use(contact, certain) ----
+
+    template <class Use> void own(const MeetingPair& pair, Use&& use) const {
+        const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
+        if (in_a && in_b) {
+            const TriangleContact found =
+                contact(triangle_a(pair), closed_a_, triangle_b(pair), closed_b_, d_.options.margin);
+            return for_each_point(found, pair, [&](const Contact& c) { use(c, found.faces); });
+        }
+        if (in_a) return own_mixed(pair, triangle_a(pair), closed_a_, ellipsoid_b(pair), 1, use);
+        if (in_b) return own_mixed(pair, triangle_b(pair), closed_b_, ellipsoid_a(pair), -1, use);
+        const PlacedEllipsoid x = ellipsoid_a(pair), y = ellipsoid_b(pair);
+        const double tolerance = kTolerance * std::min(x.size, y.size);
+        Gap gap = distance_of(x, y, tolerance);
+        if (!(gap.lower > 0)) gap = depth_of(x, y, tolerance, gap.normal);
+        use(Contact{pair, gap.normal, 0.5 * (gap.point_a + gap.point_b), -gap.lower, whole(pair.node_a, kNoTriangle),
+                    whole(pair.node_b, kNoTriangle)},
+            true);
+    }
+    // A triangle and an ellipsoid; `sign`: 1 if the triangle is A's, so that normals lead from it, else -1.
+    template <class Use>
+    void own_mixed(const MeetingPair& pair, const PlacedTriangle& t, bool closed, const PlacedEllipsoid& e, double sign,
+                   Use&& use) const {
+        const dvec3 face = glm::cross(t.corner[1] - t.corner[0], t.corner[2] - t.corner[0]);
+        const auto hand_on = [&](const dvec3& n, const dvec3& middle, double depth) {
+            const bool of_face = std::abs(glm::dot(n, face)) > kSameAsFace * glm::length(face);
+            use(Contact{pair, sign * n, middle, depth, whole(pair.node_a, pair.triangle_a),
+                        whole(pair.node_b, pair.triangle_b)},
+                of_face);
+        };
+        const TriangleDistance d = distance(t, e);
+        const dvec3 between = d.on_b - d.on_a;
+        const double length = glm::length(between);
+        if (d.lower > 0) return hand_on(between / length, 0.5 * (d.on_a + d.on_b), -length);
+        // In each other: the least depth along the face's normal, or away from the nearest points of the edges.
+        double least = HUGE_VAL;
+        dvec3 best(0, 0, 1), deepest = e.center;
+        const auto consider = [&](const dvec3& v) {
+            const double size = glm::length(v);
+            if (!(size > 0)) return;
+            const dvec3 n = v / size, w = n * e.factor;
+            const double depth = highest(t, n) - (glm::dot(n, e.center) - glm::length(w));
+            if (depth < least) least = depth, best = n, deepest = e.center - e.factor * (w / glm::length(w));
+        };
+        consider(face);
+        if (!closed) consider(-face);
+        for (size_t i = 0; i < 3; ++i) {
+            const dvec3 edge = t.corner[(i + 1) % 3] - t.corner[i], from = e.center - t.corner[i];
+            const double square = glm::dot(edge, edge);
+            const double s = square > 0 ? std::clamp(glm::dot(from, edge) / square, 0.0, 1.0) : 0;
+            const dvec3 away = from - s * edge;
+            if (!closed || glm::dot(away, face) > 0) consider(away);
+        }
+        hand_on(best, deepest + 0.5 * least * best, least);
+    }
+    // The first pair's, through whatever side.
+    Contact last_resort() {
+        closed_a_ = closed_b_ = false;
+        Contact out{first_,
+                    {0, 0, 1},
+                    {0, 0, 0},
+                    0,
+                    whole(first_.node_a, first_.triangle_a),
+                    whole(first_.node_b, first_.triangle_b)};
+        bool any = false;
+        own(first_, [&](const Contact& c, bool) {
+            if (!any) out = c, any = true;
+        });
+        if (any) return out;
+        const TriangleDistance d = distance(triangle_a(first_), triangle_b(first_));
+        out.middle = 0.5 * (d.on_a + d.on_b);
+        return out;
+    }
+
+    Candidate candidate(const Contact& c) const {
+        Candidate out{c.middle, c.depth, swapped_ ? id_of(c.b, c.a) : id_of(c.a, c.b), false, c.pair};
+        for (uint32_t i = 0; i < std::min(last_.count, kManifolds); ++i) {
+            const Manifold& m = last_.manifolds[i];
+            const bool alike = glm::dot(last_normals_[i], c.normal) > kSameNormal;
+            for (uint32_t k = 0; k < std::min(m.count, kManifoldPoints) && alike; ++k)
+                out.known = out.known || m.points[k].id == out.id;
+        }
+        return out;
+    }
+    void take(const Contact& c) {
+        const double weight = std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_;
+        patches_.add(c.normal, candidate(c), weight);
+    }
+    // What waits counts if no patch resolves it.
+    void flush() {
+        for (uint32_t i = 0; i < waiting_count_; ++i)
+            if (!patches_.any([&](const Patch& p) { return resolves(p, waiting_[i].pair); })) take(waiting_[i]);
+        waiting_count_ = 0;
+    }
+
+    Descent& d_;
+    const bool swapped_;
+    const ContactManifolds& last_;
+    bool closed_a_, closed_b_, settled_ = false;
+    const double size_;
+    dvec3 last_normals_[kManifolds];
+    MeetingPair first_;
+    Patches patches_; // of the first pass, for their normals
+    static constexpr uint32_t kWaiting = 128;
+    Contact waiting_[kWaiting];
+    uint32_t waiting_count_ = 0;
+    uint32_t ways_ = 0;
+    Way way_[kManifolds];
+    Patch points_[kManifolds]; // of the second
+};
+
+Vec3 to_float(const dvec3& v) {
+    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+
+ContactPoint point_of(const Candidate& c, const dvec3& normal, bool swapped, const RelativePose& to_world) {
+    ContactPoint out;
+    const auto world = [&](double along) {
+        return to_float(to_world.rotation * (c.middle + along * c.depth * normal) + to_world.translation);
+    };
+    out.point_a = world(swapped ? -0.5 : 0.5), out.point_b = world(swapped ? 0.5 : -0.5);
+    out.depth = static_cast<float>(c.depth);
+    out.id = c.id;
+    return out;
+}
+
+// Takes over what the last query knew of the points.
+void match(Manifold& manifold, const ContactManifolds& last) {
+    const auto alike = [](const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z > kSameNormal; };
+    for (uint32_t i = 0; i < manifold.count; ++i) {
+        ContactPoint& p = manifold.points[i];
+        for (uint32_t j = 0; j < std::min(last.count, kManifolds); ++j) {
+            const Manifold& m = last.manifolds[j];
+            if (!alike(m.normal, manifold.normal)) continue;
+            for (uint32_t k = 0; k < std::min(m.count, kManifoldPoints); ++k) {
+                if (m.points[k].id != p.id) continue;
+                p.age = m.points[k].age + 1;
+                std::copy_n(m.points[k].impulse, 3, p.impulse);
+            }
+        }
+    }
+}
+
+// In the fixed order of bodies.
+ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactManifolds& manifolds) {
+    const RelativePose to_world = relative_pose(Pose{}, pose_a);
+    const ContactManifolds last = manifolds;
+    manifolds = {};
+    Collector collector(descent, swapped, last, to_world);
+    descent.all = true;
+    ContactResult out;
+    out.verdict = descend(descent);
+    if (descent.found > 0) out.verdict = Verdict::overlapping;
+    if (out.verdict == Verdict::separated && descent.roots_meet)
+        out.verdict =
+            look_inside(descent.a.tree, descent.b.tree, descent.b_to_a, descent.stats, descent.options.max_pair_tests);
+    out.enclosed = out.verdict == Verdict::overlapping && descent.found == 0;
+    out.found = descent.found;
+    descent.stats.deepest_level = std::max(descent.a.deepest_level(), descent.b.deepest_level());
+    out.stats = descent.stats;
+    if (!std::isfinite(descent.b_to_a.distance)) return out; // no place for points
+
+    if (descent.found > 0) {
+        collector.settle();
+        descent.found = 0, descent.stats.pair_tests = 0; // what they count is known
+        descend(descent);
+    }
+    const Patch* patches[kManifolds];
+    manifolds.count = collector.patches(patches);
+    for (uint32_t i = 0; i < manifolds.count; ++i) {
+        Manifold& m = manifolds.manifolds[i];
+        Candidate points[kManifoldPoints];
+        m.count = patches[i]->reduce(collector.apart(), points);
+        for (uint32_t k = 1; k < m.count; ++k) // by id
+            for (uint32_t at = k; at > 0 && points[at].id < points[at - 1].id; --at)
+                std::swap(points[at], points[at - 1]);
+        const dvec3 normal = patches[i]->normal(), world = to_world.rotation * normal;
+        m.normal = to_float(swapped ? -world : world);
+        for (uint32_t k = 0; k < m.count; ++k) m.points[k] = point_of(points[k], normal, swapped, to_world);
+        match(m, last);
+    }
+    return out;
+}
+
+} // namespace
+} // namespace query
+
+ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
+                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options) noexcept {
+    const bool different = query::before(a, b) || query::before(b, a);
+    const bool swap = different ? query::before(b, a) : query::must_swap(a, pose_a, b, pose_b);
+    query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
+                                  : query::Descent(a, pose_a, b, pose_b, context, options);
+    return query::run(descent, swap ? pose_b : pose_a, swap, manifolds);
+}
+
+} // namespace prolate

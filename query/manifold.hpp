@@ -1,0 +1,78 @@
+// Many points of contact reduced to a few manifolds, as they come, in constant room.
+//
+// Source: Gregorius, "Robust contact creation for physics simulations" (GDC 2015): of the points of one normal keep the
+// deepest, the farthest from it, the one that makes the largest triangle with these, and the one that adds most to it;
+// Bullet and Jolt do the same, in other orders. Here points first go through a sieve of constant size: of each patch
+// the deepest is kept and the farthest in eight directions of its plane, which do not depend on the order they come in.
+// A convex outline of four corners passes it whole.
+//
+// Points of the last query are preferred while another is better by less than a tenth, so that what rests stays.
+#pragma once
+
+#include <prolate/contacts.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+
+namespace prolate::query {
+
+struct Candidate {
+    glm::dvec3 middle; // between the surfaces
+    double depth;
+    uint64_t id;
+    bool known; // of the last query
+    MeetingPair pair;
+};
+
+/// Points of about one normal.
+class Patch {
+public:
+    explicit Patch(const glm::dvec3& normal) noexcept;
+    Patch() = default;
+
+    bool takes(const glm::dvec3& normal) const noexcept;
+    /// `weight`: of the normal in the mean. Points nearer to each other than `apart` count as one.
+    void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double apart) noexcept;
+    bool empty() const noexcept { return !any_; }
+    double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; }
+    const Candidate* begin() const noexcept { return sieve_; } ///< those that stand for all, if there are any
+    const Candidate* end() const noexcept { return sieve_ + kSieve; }
+    glm::dvec3 normal() const noexcept;
+    /// The best four or fewer. Returns how many.
+    uint32_t reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept;
+
+private:
+    static constexpr uint32_t kSieve = 9; // the deepest; the farthest in eight directions
+    glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
+    Candidate sieve_[kSieve];
+    double reach_[kSieve]; // what each is the best for: depth, or coordinate
+    bool any_ = false;
+};
+
+/// Sorts points into patches by their normals.
+class Patches {
+public:
+    explicit Patches(double apart) : apart_(apart) {}
+    /// A patch for points of about this normal, if some come.
+    void expect(const glm::dvec3& normal) noexcept {
+        if (count_ < kManifolds) patches_[count_++] = Patch(normal);
+    }
+    void add(const glm::dvec3& normal, const Candidate& candidate, double weight) noexcept;
+    double apart() const noexcept { return apart_; }
+    /// Those that have points, the deepest first. Returns how many.
+    uint32_t sorted(const Patch* (&out)[kManifolds]) const noexcept;
+    /// Is there a patch with points for which is(patch) holds?
+    template <class Is> bool any(Is&& is) const {
+        for (uint32_t i = 0; i < count_; ++i)
+            if (!patches_[i].empty() && is(patches_[i])) return true;
+        return false;
+    }
+
+private:
+    double apart_;
+    Patch patches_[kManifolds];
+    uint32_t count_ = 0;
+};
+
+} // namespace prolate::query

@@ -1,0 +1,432 @@
+// Contact manifolds: boxes, balls and heaps with known contacts, and what holds for all bodies.
+#include "query/gap.hpp"
+#include "query/separation.hpp"
+#include "tests/exact_scenes.hpp"
+#include "tests/reference.hpp"
+#include "tests/scenes.hpp"
+#include "tests/shapes.hpp"
+#include "tests/targets.hpp"
+
+#include <prolate/collide.hpp>
+#include <prolate/contacts.hpp>
+#include <prolate/distance.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+using scenes::Point;
+using scenes::Random;
+
+static_assert(noexcept(contacts(std::declval<TreeView>(), Pose{}, std::declval<TreeView>(), Pose{},
+                                std::declval<ContactManifolds&>(), std::declval<QueryContext&>())));
+
+struct Solid {
+    std::vector<std::byte> bytes;
+    TreeView view() const { return *TreeView::open(bytes); }
+};
+Solid exact(const Mesh& mesh, bool closed = true) {
+    return {scenes::exact_tree(mesh, {.degree = 4, .leaf_triangles = 2, .closed = closed}).bytes};
+}
+Solid floor_box() {
+    return exact(shapes::moved(shapes::box(20, 20, 1), {-10, -10, -1}));
+}
+Solid unit_box() {
+    return exact(shapes::moved(shapes::box(), {-0.5f, -0.5f, -0.5f}));
+}
+Solid proxy(Random& random, const Point& radii, const Point& center = {}) {
+    std::vector<Point> points;
+    for (int i = 0; i < 200; ++i) {
+        const Point d = random.direction();
+        points.push_back({center[0] + radii[0] * d[0], center[1] + radii[1] * d[1], center[2] + radii[2] * d[2]});
+    }
+    return {scenes::tree(random, points, {.levels = 1}).bytes};
+}
+Pose about_z(float x, float y, float z, double angle) {
+    return {{x, y, z}, {0, 0, static_cast<float>(std::sin(angle / 2)), static_cast<float>(std::cos(angle / 2))}};
+}
+
+ContactResult ask(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, ContactManifolds& manifolds,
+                  float margin = 0) {
+    QueryContext context;
+    std::memset(&context, 0xee, sizeof context);
+    return contacts(a.view(), pose_a, b.view(), pose_b, manifolds, context, {.margin = margin});
+}
+ContactManifolds fresh(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, float margin = 0) {
+    ContactManifolds out;
+    ask(a, pose_a, b, pose_b, out, margin);
+    return out;
+}
+
+double distance_of(const Vec3& a, const Vec3& b) {
+    return std::hypot(a.x - b.x, a.y - b.y, a.z - b.z);
+}
+double dot(const Vec3& a, const Vec3& b) {
+    return double{a.x} * b.x + double{a.y} * b.y + double{a.z} * b.z;
+}
+
+// Are the four points below the corners of the unit box?
+void expect_footprint(const Manifold& m, const Pose& box, float depth) {
+    EXPECT_NEAR(m.normal.z, 1, 1e-6);
+    ASSERT_EQ(m.count, 4u);
+    for (const double x : {-0.5, 0.5})
+        for (const double y : {-0.5, 0.5}) {
+            const Point corner = scenes::rotate(box.rotation, {x, y, -0.5});
+            const Vec3 p = scenes::to_float(
+                {corner[0] + box.translation.x, corner[1] + box.translation.y, corner[2] + box.translation.z});
+            const auto same = [&](const ContactPoint& c) { return distance_of(c.point_b, p) < 1e-5; };
+            EXPECT_EQ(std::count_if(m.points, m.points + 4, same), 1);
+        }
+    for (const ContactPoint& c : m.points) {
+        EXPECT_NEAR(c.depth, depth, 2e-6);
+        EXPECT_NEAR(c.point_a.z, 0, 2e-6);
+        EXPECT_NEAR(c.point_a.z - c.point_b.z, depth, 2e-6);
+    }
+}
+
+TEST(Contacts, ABoxOnTheFloorStandsOnItsCorners) {
+    const Solid floor = floor_box(), sheet = exact(shapes::moved(shapes::sheet(8, 8, 16), {-4, -4, 0}), false),
+                box = unit_box();
+    Random random(1);
+    for (int i = 0; i < 50; ++i) {
+        const float depth = i % 3 == 0 ? 0.01f : i % 3 == 1 ? 0.0f : -0.005f;
+        const Pose pose = about_z(static_cast<float>(random.in(-2, 2)), static_cast<float>(random.in(-2, 2)),
+                                  0.5f - depth, random.in(0, 6));
+        for (const Solid* below : {&floor, &sheet}) {
+            const ContactManifolds m = fresh(*below, {}, box, pose, 0.01f);
+            ASSERT_EQ(m.count, 1u);
+            expect_footprint(m.manifolds[0], pose, depth);
+        }
+    }
+}
+
+TEST(Contacts, ABoxOnABoxOfTheSameFootprint) {
+    const Solid box = unit_box();
+    for (const float depth : {0.01f, 0.0f, -0.005f}) {
+        const Pose above{{0, 0, 1 - depth}, {}};
+        const ContactManifolds m = fresh(box, {}, box, above, 0.01f);
+        ASSERT_EQ(m.count, 1u);
+        EXPECT_NEAR(m.manifolds[0].normal.z, 1, 1e-6);
+        ASSERT_EQ(m.manifolds[0].count, 4u);
+        for (const ContactPoint& c : m.manifolds[0].points) {
+            EXPECT_NEAR(std::abs(c.point_b.x), 0.5, 1e-5);
+            EXPECT_NEAR(std::abs(c.point_b.y), 0.5, 1e-5);
+            EXPECT_NEAR(c.depth, depth, 1e-6);
+        }
+    }
+}
+
+TEST(Contacts, ABoxInACornerHasTwoManifolds) {
+    Mesh room = shapes::moved(shapes::box(20, 20, 1), {-10, -10, -1});
+    shapes::append(room, shapes::moved(shapes::box(1, 20, 5), {-1, -10, 0.001f}));
+    const ContactManifolds m = fresh(exact(room), {}, unit_box(), {{0.49f, 0, 0.48f}, {}});
+    ASSERT_EQ(m.count, 2u);
+    EXPECT_NEAR(m.manifolds[0].normal.z, 1, 1e-6); // the deeper
+    EXPECT_NEAR(m.manifolds[0].points[0].depth, 0.02, 1e-6);
+    EXPECT_NEAR(m.manifolds[1].normal.x, 1, 1e-6);
+    EXPECT_NEAR(m.manifolds[1].points[0].depth, 0.01, 1e-6);
+    EXPECT_EQ(m.manifolds[0].count, 4u);
+    EXPECT_EQ(m.manifolds[1].count, 4u);
+}
+
+TEST(Contacts, ATableStandsOnFourFeet) {
+    Mesh table = shapes::moved(shapes::box(2, 1, 0.1f), {-1, -0.5f, 1});
+    for (const float x : {-0.95f, 0.85f})
+        for (const float y : {-0.45f, 0.35f})
+            shapes::append(table, shapes::moved(shapes::box(0.1f, 0.1f, 1.01f), {x, y, 0}));
+    const ContactManifolds m = fresh(floor_box(), {}, exact(table), {{0, 0, -0.002f}, {}});
+    ASSERT_EQ(m.count, 1u);
+    ASSERT_EQ(m.manifolds[0].count, 4u);
+    for (const ContactPoint& c : m.manifolds[0].points) { // the outermost corners of the feet
+        EXPECT_NEAR(std::abs(c.point_b.x), 0.95, 1e-5);
+        EXPECT_NEAR(std::abs(c.point_b.y), 0.45, 1e-5);
+        EXPECT_NEAR(c.depth, 0.002, 1e-6);
+    }
+}
+
+TEST(Contacts, EdgesThatCross) {
+    // Two boxes on their edges, crossed: one point, straight up.
+    const Solid box = unit_box();
+    const float s = std::numbers::sqrt2_v<float> / 2, c = std::cos(std::numbers::pi_v<float> / 8),
+                d = std::sin(std::numbers::pi_v<float> / 8);
+    const Pose below{{}, {d, 0, 0, c}};
+    for (const float depth : {0.02f, -0.004f}) {
+        const ContactManifolds m = fresh(box, below, box, {{0.1f, 0.05f, 2 * s - depth}, {0, d, 0, c}}, 0.005f);
+        ASSERT_EQ(m.count, 1u);
+        ASSERT_EQ(m.manifolds[0].count, 1u);
+        EXPECT_NEAR(m.manifolds[0].normal.z, 1, 1e-5);
+        const ContactPoint& p = m.manifolds[0].points[0];
+        EXPECT_NEAR(p.depth, depth, 1e-5);
+        EXPECT_NEAR(p.point_a.x, 0.1, 1e-5);
+        EXPECT_NEAR(p.point_a.y, 0, 1e-5);
+    }
+}
+
+TEST(Contacts, BallsTouchAlongTheirCenters) {
+    const Solid ball = exact(shapes::icosphere(4));
+    Random random(2);
+    for (int i = 0; i < 20; ++i) {
+        const Point d = random.direction();
+        const double depth = random.in(-0.01, 0.02);
+        const Pose other{scenes::to_float({(2 - depth) * d[0], (2 - depth) * d[1], (2 - depth) * d[2]}),
+                         random.rotation()};
+        const ContactManifolds m = fresh(ball, {{}, random.rotation()}, ball, other, 0.02f);
+        ASSERT_GE(m.count, 1u);
+        EXPECT_GT(dot(m.manifolds[0].normal, scenes::to_float(d)), 0.99);
+        float deepest = -1;
+        for (uint32_t k = 0; k < m.manifolds[0].count; ++k) deepest = std::max(deepest, m.manifolds[0].points[k].depth);
+        EXPECT_NEAR(deepest, depth, 0.006); // facets
+    }
+}
+
+TEST(Contacts, EllipsoidsTouchWhereTheSlowAnswerSays) {
+    Random random(3);
+    int deep = 0, near = 0;
+    for (int i = 0; i < 200; ++i) {
+        const auto some = [&] { return proxy(random, scenes::radii(random, 4)); };
+        const Solid a = some(), b = some();
+        const Point d = random.direction();
+        const double t = random.in(0.8, 2.2);
+        const Pose pose_a{{}, random.rotation()},
+            pose_b{scenes::to_float({t * d[0], t * d[1], t * d[2]}), random.rotation()};
+        const float margin = 0.1f;
+        const ContactManifolds m = fresh(a, pose_a, b, pose_b, margin);
+        const Ellipsoid x = a.view().ellipsoid(0), y = b.view().ellipsoid(0);
+        const auto gap = [&](const Pose& pose) {
+            return query::distance_of(query::place(x), query::place(y, query::relative_pose(pose_a, pose)), 1e-9);
+        };
+        if (gap(pose_b).lower > margin) {
+            EXPECT_EQ(m.count, 0u);
+            continue;
+        }
+        ASSERT_EQ(m.count, 1u);
+        ASSERT_EQ(m.manifolds[0].count, 1u);
+        const ContactPoint& p = m.manifolds[0].points[0];
+        ++(p.depth > 0 ? deep : near);
+        // Moved by the depth along the normal, B touches A.
+        Pose moved = pose_b;
+        const Vec3 n = m.manifolds[0].normal;
+        moved.translation.x += p.depth * n.x, moved.translation.y += p.depth * n.y,
+            moved.translation.z += p.depth * n.z;
+        const reference::Pair pair(x, pose_a, y, moved);
+        EXPECT_NEAR(static_cast<double>(reference::contact(pair)), 1, 2e-5);
+        EXPECT_NEAR(distance_of(p.point_a, p.point_b), std::abs(p.depth), 1e-6);
+    }
+    EXPECT_GT(deep, 30);
+    EXPECT_GT(near, 5);
+}
+
+TEST(Contacts, ATriangleOnAnEllipsoid) {
+    Random random(4);
+    const Solid floor = floor_box(), ball = proxy(random, {1, 1, 1});
+    const Ellipsoid e = ball.view().ellipsoid(0);
+    for (const bool swap : {false, true})
+        for (int i = 0; i < 20; ++i) {
+            Pose pose{{static_cast<float>(random.in(-2, 2)), 1.3f, 0}, random.rotation()};
+            pose.translation.z = static_cast<float>(random.in(0.95, 1.1));
+            // The lowest point of the ellipsoid.
+            const Point down =
+                scenes::rotate({-pose.rotation.x, -pose.rotation.y, -pose.rotation.z, pose.rotation.w}, {0, 0, 1});
+            const double w[3] = {e.l11 * down[0] + e.l21 * down[1] + e.l31 * down[2], e.l22 * down[1] + e.l32 * down[2],
+                                 e.l33 * down[2]};
+            const double lowest = pose.translation.z + down[0] * e.center.x + down[1] * e.center.y +
+                                  down[2] * e.center.z - std::hypot(w[0], w[1], w[2]);
+            const ContactManifolds m = swap ? fresh(ball, pose, floor, {}, 0.2f) : fresh(floor, {}, ball, pose, 0.2f);
+            ASSERT_EQ(m.count, 1u);
+            EXPECT_NEAR(m.manifolds[0].normal.z, swap ? -1 : 1, 1e-3);
+            float deepest = -1;
+            for (uint32_t k = 0; k < m.manifolds[0].count; ++k)
+                deepest = std::max(deepest, m.manifolds[0].points[k].depth);
+            EXPECT_NEAR(deepest, -lowest, 1e-3);
+        }
+}
+
+// ---- time ----
+
+std::vector<uint64_t> ids_of(const ContactManifolds& m) {
+    std::vector<uint64_t> out;
+    for (uint32_t i = 0; i < m.count; ++i)
+        for (uint32_t k = 0; k < m.manifolds[i].count; ++k) out.push_back(m.manifolds[i].points[k].id);
+    return out;
+}
+
+TEST(Contacts, PointsOfASlidingBoxKeepTheirIdsAndImpulses) {
+    const Solid sheet = exact(shapes::moved(shapes::sheet(8, 8, 16), {-4, -4, 0}), false), box = unit_box();
+    for (const Solid& below : {floor_box(), sheet}) {
+        ContactManifolds m;
+        std::vector<uint64_t> first;
+        for (int step = 0; step < 200; ++step) {
+            const Pose pose = about_z(0.01f * static_cast<float>(step) - 1, 0.004f * static_cast<float>(step), 0.498f,
+                                      0.3 + 0.002 * step);
+            ask(below, {}, box, pose, m);
+            ASSERT_EQ(m.count, 1u);
+            ASSERT_EQ(m.manifolds[0].count, 4u);
+            if (step == 0) first = ids_of(m);
+            ASSERT_EQ(ids_of(m), first) << step;
+            for (ContactPoint& p : m.manifolds[0].points) {
+                EXPECT_EQ(p.age, static_cast<uint32_t>(step));
+                EXPECT_EQ(p.impulse[0], step == 0 ? 0 : static_cast<float>(p.id % 1000));
+                p.impulse[0] = static_cast<float>(p.id % 1000);
+            }
+        }
+    }
+}
+
+TEST(Contacts, AStackAtRestDoesNotJitter) {
+    const Solid box = unit_box();
+    Random random(5);
+    ContactManifolds m;
+    std::vector<uint64_t> first;
+    const auto shake = [&](float x) { return x + static_cast<float>(random.in(-2e-6, 2e-6)); };
+    for (int step = 0; step < 300; ++step) {
+        // The order of the poses' bits changes at random, and so does which of two corners is the deepest.
+        const Pose lower{{shake(0), shake(0), shake(0)}, {shake(0), shake(0), shake(0), 1}},
+            upper{{shake(0), shake(0.2f), shake(0.999f)}, {shake(0), shake(0), shake(0.1f), 1}};
+        ask(box, lower, box, upper, m, 0.001f);
+        ASSERT_EQ(m.count, 1u);
+        ASSERT_EQ(m.manifolds[0].count, 4u);
+        EXPECT_GT(m.manifolds[0].normal.z, 1 - 1e-6);
+        if (step == 0) first = ids_of(m);
+        ASSERT_EQ(ids_of(m), first) << step;
+        for (const ContactPoint& p : m.manifolds[0].points) EXPECT_NEAR(p.depth, 0.001, 2e-5);
+    }
+}
+
+TEST(Contacts, LeavingPointsAreForgotten) {
+    const Solid floor = floor_box(), box = unit_box();
+    ContactManifolds m;
+    ask(floor, {}, box, about_z(0, 0, 0.499f, 0), m);
+    EXPECT_EQ(m.count, 1u);
+    ask(floor, {}, box, about_z(0, 0, 2, 0), m);
+    EXPECT_EQ(m.count, 0u);
+    ask(floor, {}, box, about_z(0, 0, 0.499f, 0), m);
+    EXPECT_EQ(m.manifolds[0].points[0].age, 0u);
+}
+
+// ---- what holds for all bodies ----
+
+std::vector<Solid> zoo() {
+    Random random(6);
+    std::vector<Solid> out{unit_box(),
+                           exact(shapes::torus(1, 0.3f, 24, 12)),
+                           exact(shapes::icosphere(2)),
+                           exact(shapes::sheet(2, 2, 6), false),
+                           exact(shapes::tetrahedron()),
+                           exact(shapes::moved(shapes::box(2, 2, 1e-3f), {-1, -1, 0}))};
+    out.push_back({scenes::tree(random, scenes::cloud(random, 300), {}).bytes});
+    out.push_back(proxy(random, {1, 0.4, 0.7}));
+    return out;
+}
+template <class Check> void for_each_query(int rounds, Check&& check) {
+    const auto solids = zoo();
+    Random random(7);
+    for (int i = 0; i < rounds; ++i) {
+        const auto n = static_cast<uint32_t>(solids.size());
+        const Solid &a = solids[random.below(n)], &b = solids[random.below(n)];
+        const Point d = random.direction();
+        const double t = random.in(0, 2.5);
+        const Pose pose_a{scenes::to_float(random.direction()), random.rotation()};
+        const Pose pose_b{{pose_a.translation.x + static_cast<float>(t * d[0]),
+                           pose_a.translation.y + static_cast<float>(t * d[1]),
+                           pose_a.translation.z + static_cast<float>(t * d[2])},
+                          random.rotation()};
+        check(a, pose_a, b, pose_b, i % 2 ? 0.05f : 0.0f);
+    }
+}
+bool same(const ContactManifolds& x, const ContactManifolds& y) {
+    if (x.count != y.count) return false;
+    for (uint32_t i = 0; i < x.count; ++i) {
+        const Manifold &m = x.manifolds[i], &n = y.manifolds[i];
+        if (m.normal != n.normal || m.count != n.count) return false;
+        for (uint32_t k = 0; k < m.count; ++k) {
+            const ContactPoint &p = m.points[k], &q = n.points[k];
+            if (p.point_a != q.point_a || p.point_b != q.point_b || p.depth != q.depth || p.id != q.id ||
+                p.age != q.age)
+                return false;
+        }
+    }
+    return true;
+}
+
+TEST(Contacts, VerdictsAreThoseOfCollideAndContactsArePoints) {
+    int overlapping = 0, apart = 0;
+    for_each_query(400, [&](const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, float margin) {
+        QueryContext context;
+        ContactManifolds m;
+        const ContactResult r = ask(a, pose_a, b, pose_b, m, margin);
+        const CollideResult c = collide(a.view(), pose_a, b.view(), pose_b, context, {.margin = margin});
+        ASSERT_EQ(r.verdict, c.verdict);
+        ASSERT_EQ(r.enclosed, c.enclosed);
+        ++(r.verdict == Verdict::overlapping ? overlapping : apart);
+        EXPECT_EQ(m.count > 0, r.verdict == Verdict::overlapping && !r.enclosed);
+        for (uint32_t i = 0; i < m.count; ++i) {
+            EXPECT_NEAR(dot(m.manifolds[i].normal, m.manifolds[i].normal), 1, 1e-5);
+            EXPECT_GE(m.manifolds[i].count, 1u);
+            for (uint32_t k = 0; k < m.manifolds[i].count; ++k) {
+                const ContactPoint& p = m.manifolds[i].points[k];
+                EXPECT_GE(p.depth, -margin - 1e-5);
+                EXPECT_LE(p.depth, 2.5);
+                const Vec3 between{p.point_a.x - p.point_b.x, p.point_a.y - p.point_b.y, p.point_a.z - p.point_b.z};
+                EXPECT_NEAR(dot(between, m.manifolds[i].normal), p.depth, 1e-5);
+                for (uint32_t l = 0; l < k; ++l) EXPECT_NE(p.id, m.manifolds[i].points[l].id);
+            }
+        }
+    });
+    EXPECT_GT(overlapping, 100);
+    EXPECT_GT(apart, 100);
+}
+
+TEST(Contacts, ExchangedBodiesHaveExchangedContacts) {
+    for_each_query(300, [](const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, float margin) {
+        if (&a == &b && pose_a == pose_b) return;
+        const ContactManifolds ab = fresh(a, pose_a, b, pose_b, margin);
+        ContactManifolds ba = fresh(b, pose_b, a, pose_a, margin);
+        ASSERT_EQ(ab.count, ba.count);
+        for (uint32_t i = 0; i < ab.count; ++i) {
+            const Manifold &m = ab.manifolds[i], &n = ba.manifolds[i];
+            ASSERT_EQ(m.count, n.count);
+            EXPECT_EQ(m.normal, (Vec3{-n.normal.x, -n.normal.y, -n.normal.z}));
+            for (uint32_t k = 0; k < m.count; ++k) {
+                const auto found = std::count_if(n.points, n.points + n.count, [&](const ContactPoint& p) {
+                    return p.point_a == m.points[k].point_b && p.point_b == m.points[k].point_a &&
+                           p.depth == m.points[k].depth;
+                });
+                EXPECT_EQ(found, 1);
+            }
+        }
+    });
+}
+
+TEST(Contacts, EveryInstructionSetGivesTheSameBits) {
+    std::vector<ContactManifolds> first;
+    targets::for_each([&](const char* name) {
+        size_t i = 0;
+        for_each_query(100, [&](const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, float margin) {
+            const ContactManifolds m = fresh(a, pose_a, b, pose_b, margin);
+            if (i == first.size()) first.push_back(m);
+            EXPECT_TRUE(same(first[i++], m)) << name;
+        });
+    });
+}
+
+TEST(Contacts, WhatIsNotFiniteHasNoPoints) {
+    const Solid a = unit_box();
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        ContactManifolds m;
+        const ContactResult r = ask(a, {{bad, 0, 0}, {}}, a, {}, m);
+        EXPECT_NE(r.verdict, Verdict::separated);
+        EXPECT_EQ(m.count, 0u);
+    }
+}
+
+} // namespace
+} // namespace prolate
