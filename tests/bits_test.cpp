@@ -8,10 +8,12 @@
 
 #include <prolate/bounds.hpp>
 #include <prolate/collide.hpp>
+#include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/pairs.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
+#include <prolate/sweep.hpp>
 
 #include <gtest/gtest.h>
 
@@ -136,6 +138,33 @@ TEST(Bits, Distance) {
     expect_bits(17139403808745498815u, [](Bits& bits, const Scenes::Pair& p) {
         const DistanceResult r = distance(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.lower, r.upper, r.point_a, r.point_b, r.normal, r.pair, r.stats);
+    });
+}
+
+TEST(Bits, Contacts) {
+    expect_bits(2859262238631479865u, [](Bits& bits, const Scenes::Pair& p) {
+        ContactManifolds manifolds;
+        const ContactResult r = contacts(p.a, p.pose_a, p.b, p.pose_b, manifolds, context(), {.margin = 0.01f});
+        bits.add_all(r.verdict, r.enclosed, r.found, r.stats, manifolds.count);
+        for (uint32_t m = 0; m < manifolds.count; ++m) {
+            const Manifold& manifold = manifolds.manifolds[m];
+            bits.add_all(manifold.normal, manifold.count);
+            for (uint32_t i = 0; i < manifold.count; ++i) {
+                const ContactPoint& c = manifold.points[i];
+                bits.add_all(c.point_a, c.point_b, c.depth, c.age, c.id);
+            }
+        }
+    });
+}
+
+TEST(Bits, Sweep) {
+    expect_bits(6633822050152097653u, [](Bits& bits, const Scenes::Pair& p) {
+        const Vec3 from = p.pose_b.translation, to = p.pose_a.translation;
+        const Motion a{p.pose_a, {}, {0.3f, -1, 0.2f}, {}};
+        const Motion b{p.pose_b, {to.x - from.x, to.y - from.y, to.z - from.z}, {1, 2, -0.5f}, {}};
+        const SweepResult r = sweep(p.a, a, p.b, b, context(), {.tolerance = 1e-3});
+        bits.add_all(r.verdict, r.enclosed, r.time_lower, r.time_upper, r.distance, r.point_a, r.point_b, r.normal,
+                     r.pair, r.stats);
     });
 }
 
