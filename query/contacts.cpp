@@ -38,9 +38,8 @@ using glm::dvec3;
 constexpr double kTolerance = 1e-7;    // of the smaller ellipsoid: how exact depths are
 constexpr double kSamePoint = 1e-4;    // of the smaller body: what is nearer is one point
 constexpr double kSameFace = 0.9;      // cosine: a face turned farther from a normal has no points along it
-constexpr double kSameAsFace = 0.9999; // cosine
-constexpr double kSameNormal =
-    0.8; // cosine: a point of the last query is known again by its id, if its normal is alike
+constexpr double kSameAsFace = 0.9999; // cosine: a normal that is the face's
+constexpr double kSameNormal = 0.8;    // cosine: normals of a point in two queries, if it is the same
 
 // The finisher of SplitMix64 (Steele, Lea, Flood 2014).
 uint64_t mixed(uint64_t x) {

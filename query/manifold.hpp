@@ -18,10 +18,10 @@
 namespace prolate::query {
 
 struct Candidate {
-    glm::dvec3 middle; // between the surfaces
-    double depth;
-    uint64_t id;
-    bool known; // of the last query
+    glm::dvec3 middle{0, 0, 0}; // between the surfaces
+    double depth = 0;
+    uint64_t id = 0;
+    bool known = false; // of the last query
     MeetingPair pair;
 };
 
