@@ -1,39 +1,46 @@
 // collide() for batches: the test of separation.hpp in single precision, as many pairs at once as there are lanes.
 //
-// All pairs are evaluated once. Where most of a group stay undecided the group goes on, else its undecided pairs are
-// put on a list, to be evaluated in full groups. A pair undecided after kMaxLaneEvaluations goes to double precision.
-// What a pair goes through does not depend on its neighbours, so that neither do its answer and the counters.
+// All pairs are evaluated once, and those that stay undecided put on a list, to be evaluated on in full groups. Where
+// most of a group stayed undecided, the next group goes on at once. A pair undecided after kMaxLaneEvaluations goes to
+// double precision. What a pair goes through does not depend on its neighbours, so that neither do its answer and the
+// counters.
 //
-// Rounding, v = 2^-24. Each body comes with a bound of its own errors (pairs.cpp: slack); its floats are exact
-// otherwise. Norms as in separation.hpp; n is m below, of any length.
-//   r = c2 - c1          |dri| <= v |ri|, besides what the centers are wrong by
-//   p = n.r              3 v P, P = |nx rx| + |ny ry| + |nz rz| <= |n| |r|; with that of r 4 v P
-//   a = |L1^T n|         L1^T n: at most three products a component, 3 v |n| |L1|; length: 2.5 v a. In all 5.5 v |n|
-//   |L1| p - a - b            the first difference is wrong by v (P + a), the second by v (P + a + b)
-// so p - a - b is wrong by at most 6 v P + 7.5 v |n| (|L1| + |L2|), besides what the bodies bring. The test asks for
-// more than 7 v P and (|nx| + |ny| + |nz|) times each body's slack, which contains 8.5 v |L|: the rest pays for the
-// rounding of the bounds. Squares that underflow make a and b too small by at most 2^-62 each: kUnderflow.
+// Rounding, v = 2^-24. Each body comes with a bound of its own errors (pairs.cpp: slack); else its floats are exact.
+// Norms as in separation.hpp; n is m below, of any length; P = |n| |r|.
+//   r = c2 - c1      |dri| <= v |ri|, besides what the centers are wrong by
+//   p = n.r          3 v P, with what r is wrong by 4 v P
+//   a = |L1^T n|     L1^T n: at most three products a component, 3 v |n| |L1|; length: 2.5 v a. In all 5.5 v |n| |L1|
+//   p - a - b        the first difference is wrong by v (P + a), the second by v (P + a + b)
+// so p - a - b is wrong by at most 6 v P + 7.5 v |n| (|L1| + |L2|), besides what the bodies bring. If |r| is larger
+// than |L1| + |L2| + margin the bodies are apart by more than the margin anyway; else P <= |n| (|L1| + |L2| + margin).
+// So it suffices to ask for more than |nx| + |ny| + |nz| times slacks that contain 15 v |L| each, and times (1 + 8 v)
+// margin: 13.5 v and 6 v are needed, the rest pays for the rounding of the bounds. Squares that underflow make a and b
+// too small by at most 2^-62 each: kUnderflow.
 //
 // Overlap, the quick test: mu and lambda as computed are exact numbers; N = mu Q1 + lambda Q2, with Q of the exact
-// bodies, has trace 1 +- 6 v, and certificate (2) reads mu |L1^T m| <= det N and lambda |L2^T m| <= det N, m = adj(N)
-// r.
-//   Q1, Q2               products 3 v tau_i, the placed factors 2.1 v tau_i
-//   N                    two products and a sum: |dN| <= 7.2 v
-//   adj(N)               2 |N| |dN| + 2 v |N|^2: |d adj| <= 17 v
-//   det N                one row of each: 17 v + 3 v + 7.2 v |adj| <= 24 v
-//   m                    17 v |r| + 3 v |adj| |r| + |adj| |dr|, |adj| <= 1/2: |dm| <= 20 v |r| + slacks / 2
-//   |L1^T m|             20 v |r| |L1| + |m| (5.5 v + 1.1 v) |L1|: (24 v |r| + slacks / 2) |L1|
-// The test takes 32 v for 24 v, |rx| + |ry| + |rz| for |r|, and slack / 8 v for |L|: the rest pays for its own
-// rounding.
+// bodies, has trace 1 +- 6 v, and certificate (2) reads t1 = mu |L1^T m| / det N <= 1 and t2 = lambda |L2^T m| / det N
+// <= 1, where m = adj(N) r.
+//   Q1, Q2           products 3 v tau_i, the placed factors 2.1 v tau_i
+//   N                two products and a sum: |dN| <= 7.2 v
+//   adj(N)           2 |N| |dN| + 2 v |N|^2: |d adj| <= 17 v
+//   det N            one row of each: 17 v + 3 v + 7.2 v |adj| <= 24 v
+//   m                17 v |r| + 3 v |adj| |r| + |adj| |dr|, |adj| <= 1/2: |dm| <= 20 v |r| + slacks / 2
+//   |L1^T m|         20 v |r| |L1| + |m| (5.5 v + 1.1 v) |L1|: (24 v |r| + slacks / 2) |L1|
+// The test takes 32 v for the 24 v of det N. With |r| <= |L1| + |L2| and |L| <= slack / 15 v, L1^T m is wrong by at
+// most (1.6 + 0.5) slacks^2 / 15 v, for which it takes e = slacks^2 / 6 v. If |r| is q > 1 times |L1| + |L2|, the
+// bodies are apart: the greater of t1 and t2 is at least q, and its error at most 0.9 q mu e. To pass, mu e <= det N
+// and q det N - 0.9 q mu e + mu e <= det N, that is (q - 1) det N <= (0.9 q - 1) mu e < (q - 1) mu e: not both can be.
 //
-// The det N of needles and discs is no larger than that. The careful test, for pairs that the quick one leaves, does
-// without: w = mu L1^T m, of whatever length it is, gives a point of A, and radial_in_b() tells whether it lies in B.
+// The det N of needles and discs is no larger than that. The careful test, made of pairs that the quick one leaves
+// twice, does without: w = mu L1^T m, of whatever length it is, gives a point of A, and radial_in_b() tells whether it
+// lies in B.
 #include "query/targets.hpp"
 
 #include <prolate/pairs.hpp>
 
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <span>
 
 #undef HWY_TARGET_INCLUDE
@@ -47,10 +54,11 @@
 namespace prolate::query {
 
 inline constexpr uint32_t kMaxLaneEvaluations = 5;
-inline constexpr size_t kChunk = 512; // pairs between lists
+inline constexpr uint32_t kCarefulFrom = 3; // evaluation from which on the careful test is made
+inline constexpr size_t kChunk = 512;       // pairs between lists
 
-// Pairs that are still undecided: which, after how many evaluations, and with which rho to go on. Where a pair waits
-// after the first evaluation that is done anew: it is rare, and what the next one needs is left out of the first.
+// Pairs that are still undecided: which, after how many evaluations, and with which rho to go on. A pair that waits
+// after the first evaluation does that anew: it is rare, and the first evaluation is so the leaner.
 struct Waiting {
     size_t count = 0;
     uint32_t at[kChunk], done[kChunk];
@@ -83,6 +91,14 @@ HWY_INLINE Weights weights_of(const Pairs& p, F rho) {
     return {mu, rho * mu};
 }
 
+// What both quick tests have to leave room for.
+struct Limits {
+    F gap;   // times |mx| + |my| + |mz|
+    F error; // of |L^T m|
+    HWY_INLINE Limits(const Pairs& p, float margin)
+        : gap(p.slack + set(margin)), error(p.slack * p.slack * set(1 / (6 * kV)) + set(kUnderflow)) {}
+};
+
 // What one evaluation leaves behind.
 struct Evaluation {
     Symmetric adj; // of N
@@ -92,7 +108,7 @@ struct Evaluation {
     Mask separated, overlapping;
 };
 
-HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, F margin) {
+HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, const Limits& limits) {
     Evaluation e;
     e.mu = weights.mu, e.lambda = weights.lambda;
     const Symmetric q = p.combine(e.mu, e.lambda);
@@ -101,14 +117,10 @@ HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, F margin)
     const Vector m = e.adj * p.r;
     e.wa = p.a.transposed_times(m), e.wb = p.b.transposed_times(m);
     e.aa = dot(e.wa, e.wa), e.bb = dot(e.wb, e.wb), e.a = hn::Sqrt(e.aa), e.b = hn::Sqrt(e.bb);
-    const F px = m.x * p.r.x, py = m.y * p.r.y, pz = m.z * p.r.z;
-    const F absolute = hn::Abs(px) + hn::Abs(py) + hn::Abs(pz), length = hn::Abs(m.x) + hn::Abs(m.y) + hn::Abs(m.z);
-    e.separated =
-        hn::Gt(px + py + pz - e.a - e.b, (p.slack + margin) * length + set(7 * kV) * absolute + set(kUnderflow));
-
-    const F error = set(4) * p.r1 + set(1 / (8 * kV)) * p.slack, room = e.det - set(32 * kV);
-    e.overlapping = hn::And(hn::Le(e.mu * (e.a + set(kUnderflow) + p.a.slack * error), room),
-                            hn::Le(e.lambda * (e.b + set(kUnderflow) + p.b.slack * error), room));
+    const F length = hn::Abs(m.x) + hn::Abs(m.y) + hn::Abs(m.z);
+    e.separated = hn::Gt(dot(m, p.r) - e.a - e.b, limits.gap * length + set(kUnderflow));
+    const F room = e.det - set(32 * kV);
+    e.overlapping = hn::And(hn::Le(e.mu * (e.a + limits.error), room), hn::Le(e.lambda * (e.b + limits.error), room));
     return e;
 }
 
@@ -138,101 +150,113 @@ public:
 
     PairStats run() {
         for (size_t begin = 0; begin < pairs_.size(); begin += kChunk) {
-            begin_ = begin, end_ = std::min(begin + kChunk, pairs_.size());
+            begin_ = begin;
+            const auto count = static_cast<uint32_t>(std::min(kChunk, pairs_.size() - begin));
             waiting_.count = 0;
-            for (size_t first = begin_; first < end_; first += width()) start(first);
+            uint32_t undecided = 0; // of a group, after its first evaluation
+            for (uint32_t first = 0; first < count; first += static_cast<uint32_t>(width())) {
+                const uint32_t size = std::min(count - first, static_cast<uint32_t>(width()));
+                undecided = 2 * undecided > width() ? many(first, size) : one(first, size);
+            }
             for (size_t first = 0; first < waiting_.count; first += width()) go_on(first);
         }
         return stats_;
     }
 
 private:
-    HWY_INLINE const float* row(uint32_t body) const { return bodies_.world[body].center; }
-
-    HWY_INLINE void take(const Evaluation& e, uint32_t& left, uint32_t& separated) {
-        separated |= left & bits(e.separated);
-        left &= ~bits(hn::Or(e.separated, e.overlapping));
+    // First evaluation of `size` pairs from `first` on. Returns how many stay undecided.
+    HWY_INLINE uint32_t one(uint32_t first, uint32_t size) {
+        IndexPair repeated[8];
+        const Pairs p(bodies_.world.data(), full(first, size, repeated));
+        const Evaluation e = evaluate(p, first_weights(p), Limits(p, lane_margin_));
+        uint32_t left = ((1u << size) - 1) & ~bits(hn::Or(e.separated, e.overlapping));
+        write(first, size, bits(e.separated));
+        const auto undecided = static_cast<uint32_t>(std::popcount(left));
+        stats_.evaluations += size - undecided;
+        for (; left != 0; left &= left - 1) waiting_.add(first + static_cast<uint32_t>(std::countr_zero(left)), 0, 0);
+        return undecided;
     }
 
-    // First evaluation of the pairs from `first` on.
-    HWY_INLINE void start(size_t first) {
-        const size_t count = std::min(width(), end_ - first);
-        const float* rows_a[8];
-        const float* rows_b[8];
-        for (size_t i = 0; i < width(); ++i) {
-            const IndexPair& pair = pairs_[std::min(first + i, end_ - 1)];
-            rows_a[i] = row(pair.a), rows_b[i] = row(pair.b);
-        }
-        const Pairs p(rows_a, rows_b);
-        uint32_t separated = 0, left = (1u << count) - 1;
-        const Evaluation e = evaluate(p, first_weights(p), set(lane_margin_));
-        take(e, left, separated);
-        stats_.evaluations += count - static_cast<uint32_t>(std::popcount(left));
-        float rhos[8];
-        uint32_t done = 0;
-        if (2 * static_cast<size_t>(std::popcount(left)) > width()) done = stay(p, e, left, separated, rhos);
-        for (size_t i = 0; i < count; ++i)
-            verdicts_[first + i] = static_cast<Verdict>(~separated >> i & 1); // separated or overlapping
-        for (; left != 0; left &= left - 1) {
-            const auto lane = static_cast<size_t>(std::countr_zero(left));
-            waiting_.add(static_cast<uint32_t>(first + lane - begin_), done, done ? rhos[lane] : 0);
-        }
+    // The pairs from `first` on; lanes without a pair repeat the last one.
+    HWY_INLINE const IndexPair* full(uint32_t first, uint32_t size, IndexPair repeated[8]) const {
+        const IndexPair* const pairs = pairs_.data() + begin_ + first;
+        if (size == width()) return pairs;
+        for (uint32_t i = 0; i < width(); ++i) repeated[i] = pairs[std::min(i, size - 1)];
+        return repeated;
     }
 
-    // Further evaluations while most lanes of a group are undecided.
-    HWY_INLINE uint32_t stay(const Pairs& p, const Evaluation& first, uint32_t& left, uint32_t& separated,
-                             float* rhos) {
-        stats_.evaluations += static_cast<uint32_t>(std::popcount(left));
+    // verdicts from `first` on: separated where the bit is 1, else overlapping, which is what undecided pairs begin
+    // with
+    void write(uint32_t first, uint32_t size, uint32_t separated) {
+        static_assert(static_cast<int>(Verdict::separated) == 0 && static_cast<int>(Verdict::overlapping) == 1);
+        Verdict* const out = &verdict_of(first);
+        if (size == 8 && std::endian::native == std::endian::little) {
+            // Bit i to the lowest bit of byte i: copy to all bytes, keep one bit in each, carry it into the highest.
+            const uint64_t kept = (uint64_t{~separated & 0xffu} * 0x0101010101010101u) & 0x8040201008040201u;
+            const uint64_t bytes = ((kept + 0x7f7f7f7f7f7f7f7fu) >> 7) & 0x0101010101010101u;
+            std::memcpy(out, &bytes, sizeof bytes);
+            return;
+        }
+        for (uint32_t i = 0; i < size; ++i) out[i] = static_cast<Verdict>(~separated >> i & 1);
+    }
+
+    // The same, and on, while most are undecided.
+    HWY_NOINLINE uint32_t many(uint32_t first, uint32_t size) {
+        IndexPair repeated[8];
+        const Pairs p(bodies_.world.data(), full(first, size, repeated));
+        const Limits limits(p, lane_margin_);
+        uint32_t left = (1u << size) - 1, separated = 0, done = 0, undecided = 0;
         F rho = first_rho(p);
-        Evaluation e = first;
-        for (uint32_t done = 1;; ++done) {
-            left &= ~bits(overlapping(p, e));
-            rho = next(p, e, rho);
-            if (2 * static_cast<size_t>(std::popcount(left)) <= width() || done == kMaxLaneEvaluations) {
-                hn::StoreU(rho, Lanes(), rhos);
-                return done;
-            }
+        for (Weights weights = first_weights(p);; weights = weights_of(p, rho)) {
             stats_.evaluations += static_cast<uint32_t>(std::popcount(left));
-            e = evaluate(p, weights_of(p, rho), set(lane_margin_));
-            take(e, left, separated);
+            const Evaluation e = evaluate(p, weights, limits);
+            separated |= left & bits(e.separated);
+            left &= ~bits(hn::Or(e.separated, e.overlapping));
+            if (done == 0) undecided = static_cast<uint32_t>(std::popcount(left));
+            if (++done >= kCarefulFrom) left &= ~bits(overlapping(p, e));
+            rho = next(p, e, rho);
+            if (2 * static_cast<uint32_t>(std::popcount(left)) <= width() || done == kMaxLaneEvaluations) break;
         }
+        write(first, size, separated);
+        float rhos[8];
+        hn::StoreU(rho, Lanes(), rhos);
+        for (; left != 0; left &= left - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(left));
+            waiting_.add(first + lane, done, rhos[lane]);
+        }
+        return undecided;
     }
 
     // The rest of the evaluations of the pairs that wait at `first` and behind.
     void go_on(size_t first) {
-        const size_t count = std::min(width(), waiting_.count - first);
-        const float* rows_a[8];
-        const float* rows_b[8];
-        float rhos[8], fresh[8];
-        uint32_t done[8] = {};
+        const size_t size = std::min(width(), waiting_.count - first);
+        IndexPair pairs[8];
+        float rhos[8], done[8];
         for (size_t i = 0; i < width(); ++i) {
-            const size_t j = std::min(first + i, waiting_.count - 1);
-            const IndexPair& pair = pairs_[begin_ + waiting_.at[j]];
-            rows_a[i] = row(pair.a), rows_b[i] = row(pair.b), rhos[i] = waiting_.rho[j], done[i] = waiting_.done[j];
-            fresh[i] = done[i] == 0 ? 1.0f : 0.0f;
+            const size_t j = first + std::min(i, size - 1);
+            pairs[i] = pairs_[begin_ + waiting_.at[j]];
+            rhos[i] = waiting_.rho[j], done[i] = static_cast<float>(waiting_.done[j]);
         }
-        const Pairs p(rows_a, rows_b);
-        const Mask anew = hn::Gt(hn::LoadU(Lanes(), fresh), set(0));
-        F rho = hn::IfThenElse(anew, first_rho(p), hn::LoadU(Lanes(), rhos));
+        const Pairs p(bodies_.world.data(), pairs);
+        const Limits limits(p, lane_margin_);
+        F times = hn::LoadU(Lanes(), done); // evaluated
+        const Mask anew = hn::Eq(times, set(0));
+        F rho = choose(anew, first_rho(p), hn::LoadU(Lanes(), rhos));
         const Weights from_start = first_weights(p), from_rho = weights_of(p, rho);
-        Weights weights{hn::IfThenElse(anew, from_start.mu, from_rho.mu),
-                        hn::IfThenElse(anew, from_start.lambda, from_rho.lambda)};
-        for (uint32_t left = (1u << count) - 1; left != 0;) {
-            for (uint32_t rest = left; rest != 0; rest &= rest - 1) {
-                const auto lane = static_cast<size_t>(std::countr_zero(rest));
-                if (done[lane]++ < kMaxLaneEvaluations) continue;
-                in_double(waiting_.at[first + lane]);
-                left &= ~(1u << lane);
-            }
+        Weights weights{choose(anew, from_start.mu, from_rho.mu), choose(anew, from_start.lambda, from_rho.lambda)};
+        for (uint32_t left = (1u << size) - 1; left != 0; weights = weights_of(p, rho)) {
+            uint32_t exhausted = left & bits(hn::Ge(times, set(kMaxLaneEvaluations)));
+            left &= ~exhausted;
+            for (; exhausted != 0; exhausted &= exhausted - 1)
+                in_double(waiting_.at[first + static_cast<size_t>(std::countr_zero(exhausted))]);
             stats_.evaluations += static_cast<uint32_t>(std::popcount(left));
-            uint32_t separated = 0;
-            const Evaluation e = evaluate(p, weights, set(lane_margin_));
-            take(e, left, separated);
-            left &= ~bits(overlapping(p, e));
-            for (; separated != 0; separated &= separated - 1)
+            const Evaluation e = evaluate(p, weights, limits);
+            for (uint32_t separated = left & bits(e.separated); separated != 0; separated &= separated - 1)
                 verdict_of(waiting_.at[first + static_cast<size_t>(std::countr_zero(separated))]) = Verdict::separated;
+            times = times + set(1);
+            const Mask careful = hn::And(hn::Ge(times, set(kCarefulFrom)), overlapping(p, e));
+            left &= ~bits(hn::Or(hn::Or(e.separated, e.overlapping), careful));
             rho = next(p, e, rho);
-            weights = weights_of(p, rho);
         }
     }
 
@@ -248,7 +272,7 @@ private:
     const std::span<const IndexPair> pairs_;
     const std::span<Verdict> verdicts_;
     const float margin_, lane_margin_;
-    size_t begin_ = 0, end_ = 0;
+    size_t begin_ = 0; // of the chunk
     PairStats stats_;
     Waiting waiting_;
 };

@@ -5,7 +5,8 @@
 // after kMaxLaneEvaluations goes to double precision. Lanes do not see each other, so that neither answers nor counters
 // depend on the neighbours.
 //
-// Rounding, v = 2^-24, P and slack as in collide_pairs.cpp, s the sum of both slacks.
+// Rounding, v = 2^-24, P and slack as in collide_pairs.cpp, except that 6 v |L| is taken off each slack, which is for
+// centers that are near each other; s is the sum of both.
 //   n                    scaled to length 1 +- 4 v; the gap of n / |n| differs by 5 v |g| <= 5 v P
 //   lower bound          g - s - 7 v P for n (collide_pairs.cpp), less 5 v P: 12 v P, and kUnderflow for a and b
 //   x1, x2               L (w / |w|) for the float w is exact but for 3 v |L| of the product, 3.5 v |L| of the length
@@ -36,9 +37,6 @@ constexpr float kLargest = 1.8f; // step in logarithms of rho and sigma
 HWY_INLINE F at_least(F x, float least) { // NaN gives least
     return hn::IfThenElse(hn::Gt(x, set(least)), x, set(least));
 }
-HWY_INLINE F choose(Mask mask, F yes, F no) {
-    return hn::IfThenElse(mask, yes, no);
-}
 HWY_INLINE F bounded_step(F x) {
     return at_least(choose(hn::Lt(x, set(kLargest)), x, set(kLargest)), -kLargest);
 }
@@ -54,8 +52,8 @@ struct Answer {
 
 class DistanceLanes {
 public:
-    HWY_INLINE DistanceLanes(const float* const* rows_a, const float* const* rows_b, float tolerance)
-        : p_(rows_a, rows_b), tolerance_(set(tolerance)) {
+    HWY_INLINE DistanceLanes(const WorldEllipsoid* bodies, const IndexPair* pairs, float tolerance)
+        : p_(bodies, pairs), tolerance_(set(tolerance)), slack_(p_.slack - set(6 * kV) * (p_.a.size + p_.b.size)) {
         const F third = set(0.57735f), width_a = p_.a.size * third, width_b = p_.b.size * third;
         rho_ = best_rho_ = p_.a.size / p_.b.size; // that of two spheres
         sigma_ = width_a * at_least(hn::Sqrt(dot(p_.r, p_.r)) - width_a - width_b, 0);
@@ -82,8 +80,8 @@ public:
         const F absolute = hn::Abs(px) + hn::Abs(py) + hn::Abs(pz);
         const F g = px + py + pz - a - b, apart = hn::Sqrt(dot(between, between));
 
-        out.lower = g - (p_.slack + set(12 * kV) * absolute + set(kUnderflow));
-        const F above = apart + (set(1.5f) * p_.slack + set(4 * kV) * (p_.r1 + apart) + set(kUnderflow));
+        out.lower = g - (slack_ + set(12 * kV) * absolute + set(kUnderflow));
+        const F above = apart + (set(1.5f) * slack_ + set(4 * kV) * (p_.distance() + apart) + set(kUnderflow));
         out.upper = choose(inside_, depth_, above);
         out.normal = n;
         out.point_a = {p_.a.center.x + xa.x, p_.a.center.y + xa.y, p_.a.center.z + xa.z};
@@ -149,6 +147,7 @@ private:
 
     const Pairs p_;
     const F tolerance_;
+    const F slack_; // of distances
     F rho_, sigma_;
     F best_rho_, best_sigma_, best_gap_; // where the gap was greatest so far
     F depth_;                            // minus a certified depth, of lanes inside
@@ -160,13 +159,9 @@ PairStats distance_pairs(const EllipsoidBodies& bodies, std::span<const IndexPai
     PairStats stats;
     for (size_t first = 0; first < pairs.size(); first += width()) {
         const size_t count = std::min(width(), pairs.size() - first);
-        const float* rows_a[8];
-        const float* rows_b[8];
-        for (size_t i = 0; i < width(); ++i) {
-            const IndexPair& pair = pairs[std::min(first + i, pairs.size() - 1)];
-            rows_a[i] = bodies.world[pair.a].center, rows_b[i] = bodies.world[pair.b].center;
-        }
-        DistanceLanes lanes(rows_a, rows_b, tolerance);
+        IndexPair in_lanes[8];
+        for (size_t i = 0; i < width(); ++i) in_lanes[i] = pairs[first + std::min(i, count - 1)];
+        DistanceLanes lanes(bodies.world.data(), in_lanes, tolerance);
         uint32_t left = (1u << count) - 1;
         for (uint32_t done = 0; left != 0 && done < kMaxDistanceEvaluations; ++done) {
             stats.evaluations += static_cast<uint32_t>(std::popcount(left));

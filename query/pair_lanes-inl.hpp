@@ -37,6 +37,9 @@ HWY_INLINE F set(float x) {
 constexpr float kV = 0x1p-24f;         // v of the error analyses
 constexpr float kUnderflow = 0x1p-60f; // by which two lengths may be too small because squares underflow
 
+HWY_INLINE F choose(Mask mask, F yes, F no) {
+    return hn::IfThenElse(mask, yes, no);
+}
 // A bit a lane.
 HWY_INLINE uint32_t bits(Mask mask) {
     uint8_t out[8] = {};
@@ -89,39 +92,39 @@ struct Body {
     }
 };
 
-#if HWY_TARGET != HWY_SCALAR
-// Four consecutive floats of each row, from `offset` on, transposed: out[i] holds float `offset` + i of lane's row.
-HWY_INLINE void load_transposed(const float* const* rows, size_t offset, F out[4]) {
+// One body a lane: lane i is bodies[index(i)].
+template <class Index> HWY_INLINE Body load(const WorldEllipsoid* bodies, Index&& index) {
+    static_assert(sizeof(WorldEllipsoid) == 64, "a cache line");
+    const auto row = [&](size_t lane) HWY_ATTR { return bodies[index(lane)].center; };
+    F column[12];
+#if HWY_TARGET == HWY_SCALAR
+    for (size_t i = 0; i < 12; ++i) column[i] = set(row(0)[i]);
+#else
+    // Four floats at a time of lanes j and, if there are eight, j + 4; then blocks of four by four are transposed.
     const hn::Full128<float> d4;
     const Lanes d;
     const hn::Repartition<double, Lanes> pairs;
-    const auto row = [&](size_t i) {
+    F part[3][4];
+    for (size_t j = 0; j < 4; ++j) {
+        const float* const low = row(j);
 #if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3
-        return hn::Combine(d, hn::Load(d4, rows[i + 4] + offset), hn::Load(d4, rows[i] + offset));
+        const float* const high = row(j + 4);
+        for (size_t i = 0; i < 3; ++i)
+            part[i][j] = hn::Combine(d, hn::Load(d4, high + 4 * i), hn::Load(d4, low + 4 * i));
 #else
-        return hn::Load(d4, rows[i] + offset);
+        for (size_t i = 0; i < 3; ++i) part[i][j] = hn::Load(d4, low + 4 * i);
 #endif
-    };
-    const F r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
-    const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, r0, r1));
-    const auto high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, r0, r1));
-    const auto low23 = hn::BitCast(pairs, hn::InterleaveLower(d, r2, r3));
-    const auto high23 = hn::BitCast(pairs, hn::InterleaveUpper(d, r2, r3));
-    out[0] = hn::BitCast(d, hn::InterleaveLower(pairs, low01, low23));
-    out[1] = hn::BitCast(d, hn::InterleaveUpper(pairs, low01, low23));
-    out[2] = hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23));
-    out[3] = hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23));
-}
-#endif
-
-// One body a lane: lane i from rows[i], the first float of a WorldEllipsoid.
-HWY_INLINE Body load(const float* const* rows) {
-    static_assert(sizeof(WorldEllipsoid) == 12 * sizeof(float));
-    F column[12];
-#if HWY_TARGET == HWY_SCALAR
-    for (size_t i = 0; i < 12; ++i) column[i] = set(rows[0][i]);
-#else
-    for (size_t i = 0; i < 12; i += 4) load_transposed(rows, i, column + i);
+    }
+    for (size_t i = 0; i < 3; ++i) {
+        const auto low01 = hn::BitCast(pairs, hn::InterleaveLower(d, part[i][0], part[i][1]));
+        const auto high01 = hn::BitCast(pairs, hn::InterleaveUpper(d, part[i][0], part[i][1]));
+        const auto low23 = hn::BitCast(pairs, hn::InterleaveLower(d, part[i][2], part[i][3]));
+        const auto high23 = hn::BitCast(pairs, hn::InterleaveUpper(d, part[i][2], part[i][3]));
+        column[4 * i] = hn::BitCast(d, hn::InterleaveLower(pairs, low01, low23));
+        column[4 * i + 1] = hn::BitCast(d, hn::InterleaveUpper(pairs, low01, low23));
+        column[4 * i + 2] = hn::BitCast(d, hn::InterleaveLower(pairs, high01, high23));
+        column[4 * i + 3] = hn::BitCast(d, hn::InterleaveUpper(pairs, high01, high23));
+    }
 #endif
     return {{column[0], column[1], column[2]},
             column[3],
@@ -141,13 +144,18 @@ struct Pairs {
     Vector r; // from A's center to B's
     Symmetric q1, q2;
     F slack; // of both bodies
-    F r1;    // |rx| + |ry| + |rz|
 
-    HWY_INLINE Pairs(const float* const* rows_a, const float* const* rows_b)
-        : a(load(rows_a)),
-          b(load(rows_b)), r{b.center.x - a.center.x, b.center.y - a.center.y, b.center.z - a.center.z}, q1(a.shape()),
-          q2(b.shape()), slack(a.slack + b.slack), r1(hn::Abs(r.x) + hn::Abs(r.y) + hn::Abs(r.z)) {}
+    // As many as there are lanes.
+    HWY_INLINE Pairs(const WorldEllipsoid* bodies, const IndexPair* pairs)
+        : a(load(bodies, [=](size_t lane) { return pairs[lane].a; })),
+          b(load(bodies, [=](size_t lane) { return pairs[lane].b; })), r{b.center.x - a.center.x,
+                                                                         b.center.y - a.center.y,
+                                                                         b.center.z - a.center.z},
+          q1(a.shape()), q2(b.shape()), slack(a.slack + b.slack) {}
 
+    HWY_INLINE F distance() const { // of the centers, at least: |rx| + |ry| + |rz|
+        return hn::Abs(r.x) + hn::Abs(r.y) + hn::Abs(r.z);
+    }
     // mu Q1 + lambda Q2
     HWY_INLINE Symmetric combine(F mu, F lambda) const {
         return {mu * q1.xx + lambda * q2.xx, mu * q1.xy + lambda * q2.xy, mu * q1.yy + lambda * q2.yy,
@@ -172,7 +180,7 @@ HWY_INLINE F radial_in_b(const Pairs& p, const Vector& w, F det) {
     const F inverse = set(1) / denominator;
     const Vector solution = Vector{x * (p.b.l22 * p.b.l33), t2 * p.b.l33, t3} * inverse;
     const F radial =
-        hn::Sqrt(dot(solution, solution)) * set(1 + 16 * kV) + p.b.thinness * (p.slack + set(2 * kV) * p.r1);
+        hn::Sqrt(dot(solution, solution)) * set(1 + 16 * kV) + p.b.thinness * (p.slack + set(2 * kV) * p.distance());
     // Above this, what underflows is less than v of the denominator.
     return hn::IfThenElse(hn::Gt(denominator, set(0x1p-90f)), radial, set(2));
 }

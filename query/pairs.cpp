@@ -3,7 +3,8 @@
 // What the float form of a body (WorldEllipsoid) is wrong by is not estimated but measured, in double: the rounding of
 // its center, |center in double - center in float|, and of its factor. To that comes the error of double itself: the
 // center 37 u |c| + 2 u |c'| for a local center c and a world center c' (separation.hpp), the factor, orthogonalised
-// row by row, at most 128 u |L| (29 u of the rotation; the rest is Gram and Schmidt's backward error, generously).
+// row by row, at most 128 u |L| (29 u of the rotation; the rest is Gram and Schmidt's backward error, generously). All
+// is enlarged by 16 v, for the rounding of what lanes make of it: the sum of two, its products with lengths.
 #include "query/convert.hpp"
 #include "query/gap.hpp"
 
@@ -44,7 +45,7 @@ float round_down(double x) {
 }
 
 constexpr double kV = 0x1p-24;
-constexpr double kLaneShare = 8.5 * kV; // of |L|: collide_pairs.cpp
+constexpr double kLaneShare = 15 * kV; // of |L|: collide_pairs.cpp, distance_pairs.cpp
 
 } // namespace
 
@@ -111,7 +112,7 @@ void place(std::span<const Ellipsoid> shapes, std::span<const Pose> poses, std::
         const double size = std::sqrt(square), local_length = glm::length(local);
         const double center_error =
             local_length > 0 ? std::sqrt(moved) + 0x1p-47 * local_length + 0x1p-51 * glm::length(center) : 0;
-        out.slack = round_up(center_error + std::sqrt(lost) + 0x1p-46 * size + kLaneShare * size);
+        out.slack = round_up((center_error + std::sqrt(lost) + 0x1p-46 * size + kLaneShare * size) * (1 + 16 * kV));
         // The smallest semi-axis: that of the factor in double, less what is wrong with it.
         const double width = query::least_width(dmat3{{l11, l21, l31}, {0, l22, l32}, {0, 0, l33}}, size);
         out.thinness = width > 0 ? round_up(1 / width) : std::numeric_limits<float>::infinity();

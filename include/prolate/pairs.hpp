@@ -19,8 +19,8 @@ namespace prolate {
 
 /// Are two ellipsoids farther apart than `margin` (metres, at least 0)? `separated` is certified: their distance is
 /// greater than the margin. `overlapping`: it is not, or comes so close to it that rounding (about 1e-13 of the lengths
-/// that enter) cannot tell. Symmetric. A pose that is not finite, or whose quaternion is zero, never separates.
-/// Perram and Wertheim 1985.
+/// that enter) cannot tell; with a margin, of one in 10^5 pairs of axis ratios above 100, within 1e-5 of their size.
+/// Symmetric. A pose that is not finite, or whose quaternion is zero, never separates. Perram and Wertheim 1985.
 Verdict collide(const Ellipsoid& a, const Pose& pose_a, const Ellipsoid& b, const Pose& pose_b,
                 float margin = 0) noexcept;
 
@@ -41,7 +41,8 @@ PairDistance distance(const Ellipsoid& a, const Pose& pose_a, const Ellipsoid& b
                       float tolerance = 0) noexcept;
 
 /// A body as batches read it, in world coordinates: single precision, with a bound of what that loses.
-struct alignas(16) WorldEllipsoid {
+/// One cache line.
+struct alignas(64) WorldEllipsoid {
     float center[3];
     float slack;     ///< bound of the errors that this body brings into a gap along a unit normal, metres
     float factor[6]; ///< l11, l21, l22, l31, l32, l33 of a factor of the turned shape matrix
