@@ -1,4 +1,5 @@
-// The culling test: never separates what overlaps, and gives the same bits on every SIMD target as its scalar twin.
+// The culling test, of ellipsoids and of boxes: never separates what overlaps, and gives the same bits on every SIMD
+// target as its scalar twin.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/lanes_test.cpp"
 #include "query/targets.hpp"
@@ -8,6 +9,7 @@
 #include "query/lanes-inl.hpp"
 
 #include "src/bytes.hpp"
+#include "tests/hunt.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/targets.hpp"
@@ -37,36 +39,30 @@ uint32_t lane_gaps(const std::byte* block, int32_t step_exponent, const Single& 
     return bits;
 }
 
+uint32_t box_bits(const std::byte* block, const Single& single, float margin) {
+    return boxes_meet(block, single, margin);
+}
+
 } // namespace prolate::query::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace prolate::query {
 HWY_EXPORT(lane_gaps);
+HWY_EXPORT(box_bits);
 
 namespace {
 
+using reference::Real;
 using scenes::Point;
 using scenes::Random;
 
-// One node in a block of its own, and what it decodes to.
-struct Node {
-    std::array<std::byte, kBlockBytes> block{};
+// A full block, and what its nodes decode to.
+struct Block {
+    std::array<std::byte, kBlockBytes> bytes{};
     LatticeInfo lattice{};
-    Ellipsoid ellipsoid;
+    std::array<Ellipsoid, kBlockLanes> ellipsoids;
 };
-
-void store(Node& node, uint32_t lane, const format::PackedNode& packed) {
-    const auto at = [&](size_t offset, size_t row) {
-        return node.block.data() + offset + 2 * (kBlockLanes * row + lane);
-    };
-    for (size_t i = 0; i < 3; ++i) {
-        store_le(at(kBlockCenter, i), packed.center[i]);
-        store_le(at(kBlockDiagonal, i), packed.diagonal[i]);
-        store_le(at(kBlockOffDiagonal, i), packed.off_diagonal[i]);
-    }
-    store_le(node.block.data() + kBlockExponent + lane, packed.exponent);
-}
 
 struct Family {
     double ratio;      // largest axis ratio
@@ -75,69 +71,94 @@ struct Family {
     double body_ratio; // largest ratio of the bodies' sizes
 };
 
-// A node of a body of size `body` (metres) that is `offset` away from its frame's origin.
-Node node(Random& random, uint32_t lane, double body, const Family& family) {
-    Node out;
+// Nodes of a body of size `body` (metres) that is `offset` away from its frame's origin.
+Block block(Random& random, double body, const Family& family) {
+    Block out;
     const Point away = random.direction();
     const double shift = random.in(0, family.offset) * body;
-    double low[3], high[3], center[3];
+    double low[3], high[3];
     for (size_t i = 0; i < 3; ++i) low[i] = shift * away[i] - body / 2, high[i] = low[i] + body;
-    const format::Lattice lattice = format::lattice_for(low, high);
-    std::copy(lattice.origin, lattice.origin + 3, out.lattice.origin);
-    out.lattice.step_exponent = lattice.step_exponent;
-    for (size_t i = 0; i < 3; ++i) center[i] = random.in(low[i], high[i]);
-    const Point radii = scenes::radii(random, family.ratio);
-    const double size = body * random.log_in(family.node, 0.5);
-    const Ellipsoid e = scenes::ellipsoid({}, {size * radii[0], size * radii[1], size * radii[2]}, random.rotation());
-    const double factor[6] = {e.l11, e.l21, e.l22, e.l31, e.l32, e.l33};
-    format::PackedNode packed;
-    format::quantise(packed, lattice, center, factor);
-    out.ellipsoid = format::decode(packed, lattice);
-    store(out, lane, packed);
+    out.lattice = format::lattice_for(low, high);
+    std::array<format::PackedNode, kBlockLanes> nodes;
+    for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
+        double center[3];
+        for (size_t i = 0; i < 3; ++i) center[i] = random.in(low[i], high[i]);
+        const Point radii = family.ratio < 1000 ? scenes::radii(random, family.ratio) : hunt::radii(random);
+        const double size = body * random.log_in(family.node, 0.5);
+        const Ellipsoid e =
+            scenes::ellipsoid({}, {size * radii[0], size * radii[1], size * radii[2]}, random.rotation());
+        const double factor[6] = {e.l11, e.l21, e.l22, e.l31, e.l32, e.l33};
+        format::PackedNode& node = nodes[lane];
+        format::quantise(node, out.lattice, center, factor);
+        out.ellipsoids[lane] = format::decode(node, out.lattice);
+        for (size_t i = 0; i < 3; ++i) {
+            store_le(out.bytes.data() + block_offset(kBlockCenter, i, lane), node.center[i]);
+            store_le(out.bytes.data() + block_offset(kBlockDiagonal, i, lane), node.diagonal[i]);
+            store_le(out.bytes.data() + block_offset(kBlockOffDiagonal, i, lane), node.off_diagonal[i]);
+        }
+        store_le(out.bytes.data() + kBlockExponent + lane, node.exponent);
+    }
+    format::store_boxes(out.bytes.data(), nodes, out.lattice);
     return out;
 }
 
-struct Counts {
-    uint32_t apart = 0, overlapping = 0, separated = 0, wrong = 0;
+// What is planted to show that the hunt notices: singles whose factors, or boxes, are too small.
+struct Fault {
+    float factor = 1, box = 1;
 };
 
-// Pairs within `spread` of contact, by the reference; `shrink` < 1 plants a fault: singles that are too small.
-Counts hunt(uint64_t seed, uint32_t pairs, const Family& family, float shrink = 1, double least_spread = 1e-7) {
-    Random random(seed);
-    Counts counts;
-    for (uint32_t n = 0; n < pairs; ++n) {
+struct Counts {
+    uint64_t pairs = 0, apart = 0, separated = 0, boxes_apart = 0, very_near = 0, wrong = 0, boxes_wrong = 0;
+};
+
+// Pairs of gaps between `least_gap` and 0.3 of their size, of both signs, added to `counts`.
+void hunt_blocks(Random& random, const Family& family, double least_gap, const Fault& fault, Counts& counts) {
+    constexpr uint32_t kPairs = 64; // of two blocks
+    const double body = random.log_in(1e-3, 1e6);
+    const Block a = block(random, body, family);
+    const Block b = block(random, body * random.log_in(1 / family.body_ratio, family.body_ratio), family);
+    for (uint32_t k = 0; k < kPairs; ++k) {
         const uint32_t lane = random.below(kBlockLanes), other = random.below(kBlockLanes);
-        const double body = random.log_in(1e-3, 1e6);
-        const Node a = node(random, lane, body, family);
-        const Node b = node(random, other, body * random.log_in(1 / family.body_ratio, family.body_ratio), family);
+        const Ellipsoid &e = a.ellipsoids[lane], &f = b.ellipsoids[other];
         Pose pose_a, pose_b;
         pose_a.rotation = random.rotation(), pose_b.rotation = random.rotation();
-        const Point d = random.direction();
-        const auto center_of = [](const Node& x, const Quat& q) {
-            return scenes::rotate(q, {x.ellipsoid.center.x, x.ellipsoid.center.y, x.ellipsoid.center.z});
-        };
-        const Point ca = center_of(a, pose_a.rotation), cb = center_of(b, pose_b.rotation);
-        const auto at = [&](double t) {
-            pose_b.translation =
-                scenes::to_float({ca[0] - cb[0] + t * d[0], ca[1] - cb[1] + t * d[1], ca[2] - cb[2] + t * d[2]});
-            return static_cast<double>(reference::contact({a.ellipsoid, pose_a, b.ellipsoid, pose_b}));
-        };
-        const double spread = random.log_in(least_spread, 0.3);
-        const double start = body, now = at(start);
-        const double contact = at(start / now * (1 + random.in(-spread, spread)));
+        // Every other normal is an axis of the boxes, which else hardly ever tell.
+        Point n = random.direction();
+        if (k % 2 == 0) n = {0, 0, 0}, n[k % 3] = 1, n = scenes::rotate(pose_a.rotation, n);
+        const reference::Vector normal{n[0], n[1], n[2]};
+        const reference::Pair before(e, pose_a, f, pose_b);
+        Real size = 0;
+        for (size_t i = 0; i < 3; ++i) size += hunt::length(before.l1[i]) + hunt::length(before.l2[i]);
+        const double gap = random.log_in(least_gap, 0.3);
+        hunt::part(e, pose_a, f, pose_b, normal, random.below(2) ? size * gap : -size * gap);
 
-        const RelativePose b_to_a = relative_pose(pose_a, pose_b);
-        Single single = place(b.block.data(), other, lattice_pose(b_to_a, b.lattice, a.lattice));
+        Single single = place(b.bytes.data(), other, lattice_pose(relative_pose(pose_a, pose_b), b.lattice, a.lattice));
         for (auto& column : single.factor)
-            for (float& x : column) x *= shrink;
+            for (float& x : column) x *= fault.factor;
+        for (size_t i = 0; i < 3; ++i) {
+            const float middle = (single.low[i] + single.high[i]) / 2;
+            single.low[i] = middle + fault.box * (single.low[i] - middle);
+            single.high[i] = middle + fault.box * (single.high[i] - middle);
+        }
         LaneGap out[kBlockLanes];
-        const uint32_t bits = HWY_DYNAMIC_DISPATCH(lane_gaps)(a.block.data(), a.lattice.step_exponent, single, out);
+        const uint32_t bits = HWY_DYNAMIC_DISPATCH(lane_gaps)(a.bytes.data(), a.lattice.step_exponent, single, out);
         const bool separated = (bits >> lane & 1) != 0;
-        ++(contact > 1 ? counts.apart : counts.overlapping);
-        counts.separated += separated;
-        counts.wrong += separated && contact < 1;
+        const bool boxes_apart = (HWY_DYNAMIC_DISPATCH(box_bits)(a.bytes.data(), single, 0) >> lane & 1) == 0;
+
+        const reference::Pair pair(e, pose_a, f, pose_b);
+        const Real truth = hunt::gap_along(pair, normal);
+        const bool wrong = (separated || boxes_apart) && truth <= 0 && hunt::overlap(pair, normal);
+        ++counts.pairs, counts.apart += truth > 0, counts.very_near += std::abs(truth) < 1e-6L * size;
+        counts.separated += separated, counts.boxes_apart += boxes_apart;
+        counts.wrong += separated && wrong, counts.boxes_wrong += boxes_apart && wrong;
         EXPECT_EQ(separated, out[lane].gap > 0);
     }
+}
+
+Counts hunt_some(uint64_t seed, uint64_t pairs, const Family& family, double least_gap, const Fault& fault = {}) {
+    Random random(seed);
+    Counts counts;
+    while (counts.pairs < pairs) hunt_blocks(random, family, least_gap, fault, counts);
     return counts;
 }
 
@@ -145,24 +166,36 @@ const Family kFamilies[] = {
     {5, 1e-3, 1, 1}, {100, 1e-3, 10, 10}, {1000, 1e-2, 1, 1}, {1000, 1e-3, 1e4, 1e3}, {30, 1e-4, 0, 1e6},
 };
 
-TEST(Lanes, NeverSeparateWhatOverlaps) {
-    uint32_t seed = 0;
-    for (const Family& family : kFamilies) {
-        const Counts c = hunt(++seed, 20000, family);
-        EXPECT_EQ(c.wrong, 0u) << "family " << seed;
-        EXPECT_GT(c.apart, 20000u * 3 / 10);
-        EXPECT_GT(c.overlapping, 20000u * 3 / 10);
-        RecordProperty("separated" + std::to_string(seed), static_cast<int>(100.0 * c.separated / c.apart));
+TEST(Lanes, HuntForWrongVerdicts) {
+    const hunt::Length length;
+    Random random(1);
+    Counts counts;
+    for (size_t i = 0; length.more(counts.pairs); ++i) {
+        hunt_blocks(random, kFamilies[i % std::size(kFamilies)], 1e-7, {}, counts);
+        ASSERT_EQ(counts.wrong, 0u) << "blocks " << i;
+        ASSERT_EQ(counts.boxes_wrong, 0u) << "blocks " << i;
     }
+    EXPECT_GT(counts.apart, counts.pairs * 2 / 5);
+    EXPECT_LT(counts.apart, counts.pairs * 3 / 5);
+    EXPECT_GT(counts.very_near, counts.pairs / 20); // the hunt is where the game is
+    EXPECT_GT(counts.separated, counts.apart / 5);
+    EXPECT_GT(counts.boxes_apart, counts.apart / 20);
+    RecordProperty("pairs", std::to_string(counts.pairs));
+    RecordProperty("separated", std::to_string(counts.separated));
+    RecordProperty("boxes_apart", std::to_string(counts.boxes_apart));
 }
 
 TEST(Lanes, SeparateMostOfWhatIsApart) {
-    const Counts c = hunt(1, 20000, {5, 1e-2, 0, 1}, 1, 0.1);
+    const Counts c = hunt_some(1, 20000, {5, 1e-2, 0, 1}, 0.1);
     EXPECT_GT(c.separated, c.apart * 6 / 10);
 }
 
 TEST(LanesHarness, CatchesASingleThatIsTooSmall) {
-    EXPECT_GT(hunt(3, 20000, kFamilies[0], 1 - 1e-3f).wrong, 0u);
+    EXPECT_GT(hunt_some(3, 20000, kFamilies[0], 1e-7, {.factor = 1 - 1e-3f}).wrong, 0u);
+}
+
+TEST(LanesHarness, CatchesABoxThatIsTooSmall) {
+    EXPECT_GT(hunt_some(4, 20000, kFamilies[0], 1e-3, {.box = 0.9f}).boxes_wrong, 0u);
 }
 
 bool same(float x, float y) {
@@ -172,26 +205,24 @@ bool same(float x, float y) {
 TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarTwin) {
     Random random(7);
     for (uint32_t n = 0; n < 4000; ++n) {
-        Node a{};
-        for (auto& byte : a.block) byte = static_cast<std::byte>(random.below(256)); // any bytes at all
-        const Node b = node(random, 3, 1, kFamilies[0]);
-        if (n % 2 == 0) { // and sensible ones
-            a.lattice = b.lattice;
-            for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const Node one = node(random, lane, 1, kFamilies[1]);
-                for (size_t i = 0; i < kBlockBytes; ++i)
-                    a.block[i] = lane == 0 ? one.block[i] : a.block[i] | one.block[i];
-            }
+        const Block b = block(random, 1, kFamilies[0]);
+        Block a = block(random, 1, kFamilies[1]);
+        if (n % 2 == 0) { // any bytes at all, but for the exponents of boxes, which readers check
+            for (auto& byte : a.bytes) byte = static_cast<std::byte>(random.below(256));
+            for (size_t i = 0; i < 3; ++i)
+                store_le(a.bytes.data() + kBlockBoxExponent + i, static_cast<uint8_t>(random.below(kMaxBoxExponent)));
         }
         Pose pose;
         pose.rotation = random.rotation(), pose.translation = scenes::to_float(random.in_ball());
-        const Single single = place(b.block.data(), 3, lattice_pose(relative_pose({}, pose), b.lattice, a.lattice));
+        const Single single = place(b.bytes.data(), 3, lattice_pose(relative_pose({}, pose), b.lattice, a.lattice));
         targets::for_each([&](const char* target) {
             LaneGap out[kBlockLanes];
-            const uint32_t bits = HWY_DYNAMIC_DISPATCH(lane_gaps)(a.block.data(), a.lattice.step_exponent, single, out);
+            const uint32_t bits = HWY_DYNAMIC_DISPATCH(lane_gaps)(a.bytes.data(), a.lattice.step_exponent, single, out);
+            const uint32_t boxes = HWY_DYNAMIC_DISPATCH(box_bits)(a.bytes.data(), single, 1);
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const LaneGap twin = lane_gap(a.block.data(), lane, a.lattice.step_exponent, single);
+                const LaneGap twin = lane_gap(a.bytes.data(), lane, a.lattice.step_exponent, single);
                 ASSERT_EQ((bits >> lane & 1) != 0, twin.gap > 0) << target;
+                ASSERT_EQ((boxes >> lane & 1) == 0, boxes_apart(a.bytes.data(), lane, single, 1)) << target;
                 ASSERT_TRUE(same(twin.square, out[lane].square) && same(twin.depth, out[lane].depth) &&
                             same(twin.size, out[lane].size) && (twin.gap == 0 || same(twin.gap, out[lane].gap)))
                     << target << " lane " << lane;

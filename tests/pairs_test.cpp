@@ -1,14 +1,8 @@
-// Batches of pairs: hunts for wrong answers near contact, and what else the header promises.
-//
-// Pairs are made around a known normal n: with r = Q1 n / a + Q2 n / b + gap n the bodies are exactly `gap` apart, or
-// touch from inside. Truth is then proved in long double for the floats that are really tested: a gap along n above 0
-// separates them, a point with radial coordinates of at most 1 in both is common to them. Where neither holds (floats
-// that round to contact) the slow reference decides.
-//
-// PROLATE_SOAK_PAIRS sets how many pairs are hunted, 10^6 if it is not set; ./run soak hunts 10^8.
+// Batches of pairs, and single ones: a hunt for wrong answers near contact, and what else the header promises.
 #include "query/targets.hpp"
 
 #include "query/gap.hpp"
+#include "tests/hunt.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 
@@ -20,7 +14,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -28,30 +21,11 @@
 namespace prolate {
 namespace {
 
-using reference::inverse;
-using reference::operator*;
-using reference::operator-;
+using hunt::gap_along;
+using hunt::length;
 using reference::Real;
-using reference::transposed;
 using scenes::Point;
 using scenes::Random;
-
-#if defined(__SANITIZE_ADDRESS__)
-constexpr uint64_t kPairs = 50'000; // the sanitizers look for errors of another kind
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr uint64_t kPairs = 50'000;
-#else
-constexpr uint64_t kPairs = 1'000'000;
-#endif
-#else
-constexpr uint64_t kPairs = 1'000'000;
-#endif
-
-uint64_t hunted_pairs() {
-    const char* text = std::getenv("PROLATE_SOAK_PAIRS");
-    return text ? std::strtoull(text, nullptr, 10) : kPairs;
-}
 
 struct Bodies {
     std::vector<Ellipsoid> shapes;
@@ -66,30 +40,6 @@ struct Bodies {
     }
 };
 
-Real length(const reference::Vector& v) {
-    return std::sqrt(reference::dot(v, v));
-}
-
-// Radii with the largest 1: needles, discs and anything between, up to the axis ratio of 1000 that bakes keep.
-Point radii(Random& random) {
-    const double thin = 1 / random.log_in(1, 1000);
-    Point r{};
-    switch (random.below(3)) {
-    case 0:
-        r = {1, thin, thin * random.in(1, 1.5)};
-        break;
-    case 1:
-        r = {1, random.in(0.5, 1), thin};
-        break;
-    default:
-        r = scenes::radii(random, random.log_in(1, 1000));
-        break;
-    }
-    for (double& x : r) x = std::clamp(x, 1e-3, 1.0);
-    std::swap(r[0], r[random.below(3)]);
-    return r;
-}
-
 struct Family {
     double least_gap = 1e-7, most_gap = 1; // of the pair's size, of both signs
     double offset = 0;                     // both bodies away from the origin, of their size
@@ -102,14 +52,15 @@ const Family kFamilies[] = {
     {.least_unit = 1e-3, .most_unit = 1e6},
     {.offset = 1e4},
     {.offset = 100, .least_unit = 1e-3, .most_unit = 1e6},
+    {.least_gap = 1e-5, .offset = 1e4, .least_unit = 1e-3, .most_unit = 1e6},
     {.least_gap = 1e-6, .own_center = 10},
 };
 
-// Appends a pair.
-void add_pair(Random& random, const Family& family, Bodies& out) {
+// Appends a pair, so far apart beside the margin.
+void add_pair(Random& random, const Family& family, double margin, Bodies& out) {
     const double unit = random.log_in(family.least_unit, family.most_unit), ratio = random.log_in(0.1, 10);
     const auto shape = [&](double size) {
-        const Point r = radii(random), d = random.direction();
+        const Point r = hunt::radii(random), d = random.direction();
         const double far = family.own_center * random.unit() * unit;
         const Point center{far * d[0], far * d[1], far * d[2]};
         return scenes::ellipsoid(center, {size * r[0], size * r[1], size * r[2]}, random.rotation());
@@ -120,16 +71,9 @@ void add_pair(Random& random, const Family& family, Bodies& out) {
     const Point n = random.direction(), away = random.direction();
     const double far = family.offset > 0 ? unit * random.log_in(1, family.offset) : 0;
     pose_a.translation = scenes::to_float({far * away[0], far * away[1], far * away[2]});
-    const reference::Pair here(a, pose_a, b, pose_b);
-    const reference::Vector normal{n[0], n[1], n[2]}, qa = here.q1 * normal, qb = here.q2 * normal;
-    const Real ka = length(transposed(here.l1) * normal), kb = length(transposed(here.l2) * normal);
-    const double size = unit * (1 + ratio);
-    const double gap = (random.below(2) ? 1 : -1) * size * random.log_in(family.least_gap, family.most_gap);
-    Point t{};
-    const float* at[3] = {&pose_b.translation.x, &pose_b.translation.y, &pose_b.translation.z};
-    for (size_t i = 0; i < 3; ++i)
-        t[i] = static_cast<double>(*at[i] - here.r[i] + qa[i] / ka + qb[i] / kb + gap * normal[i]);
-    pose_b.translation = scenes::to_float(t);
+    const double gap = unit * (1 + ratio) * random.log_in(family.least_gap, family.most_gap);
+    const reference::Vector normal{n[0], n[1], n[2]};
+    hunt::part(a, pose_a, b, pose_b, normal, random.below(2) ? margin + gap : margin - gap);
 
     const auto first = static_cast<uint32_t>(out.shapes.size());
     out.shapes.push_back(a), out.shapes.push_back(b);
@@ -138,10 +82,10 @@ void add_pair(Random& random, const Family& family, Bodies& out) {
     out.normals.push_back(normal);
 }
 
-Bodies make(uint64_t seed, const Family& family, size_t count) {
+Bodies make(uint64_t seed, const Family& family, size_t count, double margin = 0) {
     Random random(seed);
     Bodies out;
-    for (size_t i = 0; i < count; ++i) add_pair(random, family, out);
+    for (size_t i = 0; i < count; ++i) add_pair(random, family, margin, out);
     out.place();
     return out;
 }
@@ -150,50 +94,38 @@ reference::Pair exact(const Bodies& bodies, size_t i) {
     return {bodies.shapes[2 * i], bodies.poses[2 * i], bodies.shapes[2 * i + 1], bodies.poses[2 * i + 1]};
 }
 
-Real gap_along(const reference::Pair& pair, const reference::Vector& n) {
-    return (reference::dot(n, pair.r) - length(transposed(pair.l1) * n) - length(transposed(pair.l2) * n)) / length(n);
-}
-
-// Do the bodies share a point? Both ends of the least distance, or the point half-way, are tried before the reference.
-bool overlap(const reference::Pair& pair, const reference::Vector& n) {
-    if (gap_along(pair, n) > 0) return false;
-    const reference::Vector qa = pair.q1 * n, qb = pair.q2 * n;
-    const Real ka = length(transposed(pair.l1) * n), kb = length(transposed(pair.l2) * n);
-    reference::Vector middle;
-    for (size_t i = 0; i < 3; ++i) middle[i] = (qa[i] / ka + pair.r[i] - qb[i] / kb) / 2;
-    if (length(inverse(pair.l1) * middle) <= 1 && length(inverse(pair.l2) * (middle - pair.r)) <= 1) return true;
-    return reference::contact(pair) <= 1;
-}
-
 struct Tally {
     uint64_t pairs = 0, separated = 0, false_separated = 0, false_overlapping = 0, unlike_single = 0, in_double = 0;
-    uint64_t very_near = 0; // gaps of at most 1e-6 of the size
-    void add(const Bodies& bodies, std::span<const Verdict> verdicts) {
+    uint64_t very_near = 0; // within 1e-6 of the size of where the verdict changes
+    void add(const Bodies& bodies, std::span<const Verdict> verdicts, float margin = 0) {
         for (size_t i = 0; i < verdicts.size(); ++i) {
             const reference::Pair pair = exact(bodies, i);
+            const reference::Vector& n = bodies.normals[i];
+            const Real gap = gap_along(pair, n) - margin, size = length(pair.l1[0]) + length(pair.r);
             const bool apart = verdicts[i] == Verdict::separated;
-            // contact() is good to 1e-14: what is nearer is not claimed to be wrong.
-            if (apart && overlap(pair, bodies.normals[i])) ++false_separated;
-            if (!apart && gap_along(pair, bodies.normals[i]) > 1e-9 * (length(pair.l1[0]) + length(pair.r)))
-                ++false_overlapping;
+            if (apart && gap <= 0 && hunt::within(pair, n, margin)) ++false_separated;
+            // Nearer than what rounding costs, or with a margin the search for the distance, nothing is promised.
+            if (!apart && gap > (margin > 0 ? 1e-4L : 1e-9L) * size) ++false_overlapping;
             unlike_single += verdicts[i] != collide(bodies.shapes[2 * i], bodies.poses[2 * i], bodies.shapes[2 * i + 1],
-                                                    bodies.poses[2 * i + 1]);
-            very_near += std::abs(gap_along(pair, bodies.normals[i])) <
-                         1e-6 * (length(pair.l1[0]) + length(pair.l1[1]) + length(pair.l1[2]));
+                                                    bodies.poses[2 * i + 1], margin);
+            very_near += std::abs(gap) < 1e-6L * size;
             separated += apart;
         }
         pairs += verdicts.size();
     }
 };
 
-TEST(Pairs, VerdictsAreTrueAndThoseOfSinglePairs) {
+TEST(Pairs, HuntForWrongVerdicts) {
     constexpr size_t kBatch = 4096;
+    const hunt::Length length;
     Tally tally;
     std::vector<Verdict> verdicts(kBatch);
-    for (uint64_t seed = 0; tally.pairs < hunted_pairs(); ++seed) {
-        const Bodies bodies = make(seed, kFamilies[seed % std::size(kFamilies)], kBatch);
-        tally.in_double += collide(bodies.view(), bodies.pairs, verdicts).in_double;
-        tally.add(bodies, verdicts);
+    for (uint64_t seed = 0; length.more(tally.pairs); ++seed) {
+        const Family& family = kFamilies[seed % std::size(kFamilies)];
+        const float margin = seed % 5 == 4 ? static_cast<float>(0.1 * family.least_unit) : 0;
+        const Bodies bodies = make(seed, family, kBatch, double{margin});
+        tally.in_double += collide(bodies.view(), bodies.pairs, verdicts, margin).in_double;
+        tally.add(bodies, verdicts, margin);
         ASSERT_EQ(tally.false_separated, 0u) << "seed " << seed;
         ASSERT_EQ(tally.false_overlapping, 0u) << "seed " << seed;
         ASSERT_EQ(tally.unlike_single, 0u) << "seed " << seed;
@@ -204,28 +136,33 @@ TEST(Pairs, VerdictsAreTrueAndThoseOfSinglePairs) {
     EXPECT_GT(share(tally.very_near), 0.05); // the hunt is where the game is
     EXPECT_LT(share(tally.in_double), 0.5);  // most is decided in lanes
     RecordProperty("in_double", std::to_string(share(tally.in_double)));
+    RecordProperty("pairs", std::to_string(tally.pairs));
 }
 
-// The harness itself: with margins of the wrong sign the lanes are wrong, and that is seen. (Without margins they
-// hardly ever are: worst cases of rounding do not come together.)
+// The harness itself: faults that are planted are seen. (Without margins lanes are hardly ever wrong: worst cases of
+// rounding do not come together. So the margins have the wrong sign here, and factors are a little wrong.)
 TEST(Pairs, WrongMarginsAreCaught) {
     Bodies bodies = make(7, kFamilies[1], 20'000);
     std::vector<Verdict> verdicts(bodies.pairs.size());
-    for (WorldEllipsoid& e : bodies.world) e.slack = -e.slack, e.thinness = 0;
-    collide(bodies.view(), bodies.pairs, verdicts);
-    Tally bare;
-    bare.add(bodies, verdicts);
+    const auto tally_with = [&](auto&& fault) {
+        bodies.place();
+        for (WorldEllipsoid& e : bodies.world) fault(e);
+        collide(bodies.view(), bodies.pairs, verdicts);
+        Tally out;
+        out.add(bodies, verdicts);
+        return out;
+    };
+    const auto scale = [](WorldEllipsoid& e, float by) {
+        for (float& l : e.factor) l *= by;
+    };
+    const Tally bare = tally_with([](WorldEllipsoid& e) { e.slack = -e.slack; });
     EXPECT_GT(bare.false_separated, 1000u);
-    EXPECT_GT(bare.false_overlapping, 100u);
     EXPECT_GT(bare.unlike_single, 1000u);
-
-    bodies.place();
-    for (WorldEllipsoid& e : bodies.world)
-        for (float& l : e.factor) l *= 1 - 0x1p-18f;
-    collide(bodies.view(), bodies.pairs, verdicts);
-    Tally shrunk;
-    shrunk.add(bodies, verdicts);
-    EXPECT_GT(shrunk.false_separated, 100u);
+    EXPECT_GT(tally_with([](WorldEllipsoid& e) { e.thinness = -e.thinness; }).false_overlapping, 100u);
+    EXPECT_GT(tally_with([&](WorldEllipsoid& e) { scale(e, 1 - 0x1p-18f); }).false_separated, 100u);
+    EXPECT_GT(tally_with([&](WorldEllipsoid& e) { scale(e, 1 + 0x1p-12f); }).false_overlapping, 100u);
+    const Tally right = tally_with([](WorldEllipsoid&) {});
+    EXPECT_EQ(right.false_separated + right.false_overlapping + right.unlike_single, 0u);
 }
 
 // What is certified of distances, for both signs.
