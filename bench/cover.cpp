@@ -387,10 +387,10 @@ private:
         report_.add(row);
     }
 
-    // The lines that peers.py prints with these arguments.
+    // The lines that decompose.py prints with these arguments.
     std::vector<std::string> run_peers(const std::string& arguments) const {
         const std::string command =
-            fmt::format("'{}' '{}' {} 2>/dev/null", a_.peers, PROLATE_BENCH_FOLDER "/peers.py", arguments);
+            fmt::format("'{}' '{}' {} 2>/dev/null", a_.peers, PROLATE_BENCH_FOLDER "/decompose.py", arguments);
         std::string text;
         if (FILE* pipe = popen(command.c_str(), "r")) {
             char buffer[4096];

@@ -34,11 +34,6 @@ public:
         tree_.addSubModel(points, triangles);
         tree_.endModel();
     }
-    size_t bytes() const override {
-        return static_cast<size_t>(tree_.getNumBVs()) * sizeof(coal::BVNode<Volume>) +
-               static_cast<size_t>(tree_.num_vertices) * sizeof(coal::Vec3s) +
-               static_cast<size_t>(tree_.num_tris) * (sizeof(coal::Triangle) + sizeof(unsigned));
-    }
     const coal::BVHModel<Volume>& tree() const { return tree_; }
 
 private:
@@ -102,7 +97,11 @@ public:
                std::string(default_ ? "by default" : "0");
     }
     // Distances do not depend on break_distance, and Coal answers none between trees of OBBs.
-    bool has_distance() const override { return default_ && std::is_same_v<Volume, coal::OBBRSS>; }
+    bool answers(Query query) const override {
+        return query == Query::collide ||
+               (query == Query::distance && default_ && std::is_same_v<Volume, coal::OBBRSS>);
+    }
+    std::string form() const override { return std::is_same_v<Volume, coal::OBBRSS> ? "coal-obbrss" : "coal-obb"; }
     std::unique_ptr<Shape> build(const Model& model) const override {
         return std::make_unique<CoalShape<Volume>>(model);
     }
@@ -119,7 +118,8 @@ private:
 
 } // namespace
 
-void add_coal(Libraries& libraries) {
+// What main.cpp looks for in the module.
+extern "C" void add_coal_meshes(Libraries& libraries) {
     libraries.push_back(std::make_unique<Coal<coal::OBBRSS>>("coal-obbrss", true));
     libraries.push_back(std::make_unique<Coal<coal::OBBRSS>>("coal-obbrss-break0", false));
     libraries.push_back(std::make_unique<Coal<coal::OBB>>("coal-obb", true));

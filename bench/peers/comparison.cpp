@@ -1,9 +1,13 @@
 #include "bench/peers/comparison.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+
+#include <malloc.h>
 
 namespace prolate::bench::peers {
 namespace {
@@ -15,6 +19,11 @@ void add(std::optional<double>& sum, const std::optional<uint64_t>& value, size_
     if (value) sum = sum.value_or(0) + static_cast<double>(*value) / static_cast<double>(poses);
 }
 
+size_t heap_in_use() {
+    const auto info = mallinfo2();
+    return info.uordblks + info.hblkhd;
+}
+
 } // namespace
 
 std::string model_name(const std::string& path_or_name) {
@@ -22,8 +31,10 @@ std::string model_name(const std::string& path_or_name) {
 }
 
 std::string Subject::name() const {
-    const char* const verb = query == Query::collide ? "collide/" : "distance/";
-    return verb + model_name(a) + "-" + model_name(b) + "/" + kind;
+    const char* const verbs[] = {"collide", "distance", "collide-again", "collide-proxy"};
+    const std::string name =
+        fmt::format("{}/{}-{}/{}", verbs[static_cast<size_t>(query)], model_name(a), model_name(b), kind);
+    return leaves > 0 ? fmt::format("{}-{}", name, leaves) : name;
 }
 
 Comparison::Comparison(ComparisonOptions options, Libraries libraries)
@@ -48,17 +59,61 @@ bool Comparison::available(const Subject& subject) {
     return entry(subject.a).model.has_value() && entry(subject.b).model.has_value();
 }
 
+const Libraries& Comparison::libraries_for(const Subject& subject) {
+    if (subject.query != Query::proxy) return libraries_;
+    const auto [at, fresh] = proxies_.try_emplace(subject.leaves);
+    if (fresh) at->second = proxy_libraries(subject.leaves, options_.python);
+    return at->second;
+}
+
+std::vector<std::string> Comparison::able(const Subject& subject) {
+    std::vector<std::string> out;
+    for (const auto& library : libraries_for(subject))
+        if (library->answers(subject.query)) out.push_back(library->name());
+    return out;
+}
+
+const Shape* Comparison::shape(const std::string& model, const Library& library) {
+    Entry& e = entry(model);
+    const auto [at, fresh] = e.shapes.try_emplace(library.form());
+    Entry::Built& built = at->second;
+    if (fresh) {
+        const size_t before = heap_in_use();
+        built.shape = library.build(*e.model);
+        built.bytes = built.shape && built.shape->bytes() > 0 ? built.shape->bytes() : heap_in_use() - before;
+    }
+    return built.shape.get();
+}
+
+bool Comparison::reference_meets(const Subject& subject, const Placement& at) {
+    for (const std::string* name : {&subject.a, &subject.b})
+        if (Entry& e = entry(*name); !e.reference) e.reference = std::make_unique<Reference>(e.model->mesh.view());
+    return meet(*entry(subject.a).reference, *entry(subject.b).reference, at);
+}
+
 const std::vector<Placement>& Comparison::poses(const Subject& subject) {
     const bool aligned = subject.kind.ends_with("-aligned");
-    const auto [at, fresh] = poses_.try_emplace(subject.a + "\n" + subject.b + (aligned ? "\naligned" : ""));
-    if (fresh) {
-        for (const std::string* name : {&subject.a, &subject.b})
-            if (Entry& e = entry(*name); !e.reference) e.reference = std::make_unique<Reference>(e.model->mesh.view());
-        at->second = make_poses(*entry(subject.a).reference, *entry(subject.b).reference, options_.poses, options_.seed,
-                                aligned);
+    const std::string key = fmt::format("{}\n{}\n{}{}", subject.a, subject.b, subject.leaves, aligned ? "a" : "");
+    const auto [at, fresh] = poses_.try_emplace(key);
+    if (fresh && subject.leaves == 0)
+        at->second = make_poses([&](const Placement& p) { return reference_meets(subject, p); }, options_.poses,
+                                options_.seed, aligned);
+    if (fresh && subject.leaves > 0) { // no mesh tells where covers meet: the first library judges itself
+        const Library& library = *libraries_for(subject).front();
+        const Shape *a = shape(subject.a, library), *b = shape(subject.b, library);
+        const auto meets = [&](const Placement& p) {
+            return library.place(*a, *b, {&p, 1})->collide(0) != Contact::apart;
+        };
+        at->second = make_poses(meets, options_.poses, options_.seed, aligned);
     }
     const PoseSets& sets = at->second;
-    return subject.kind.starts_with("far") ? sets.far : subject.kind.starts_with("near") ? sets.near : sets.touching;
+    const std::vector<Placement>& plain = subject.kind.starts_with("far")    ? sets.far
+                                          : subject.kind.starts_with("near") ? sets.near
+                                                                             : sets.touching;
+    if (subject.query != Query::again) return plain;
+    const auto [then, first] = moved_.try_emplace(subject.name());
+    if (first) then->second = moved(plain, options_.seed);
+    return then->second;
 }
 
 // Where the libraries agree, what they say; else the reference's word, and always at each 25th pose.
@@ -78,69 +133,93 @@ std::vector<double> Comparison::expected_distances(const Subject& subject,
     return out;
 }
 
-std::vector<Outcome> Comparison::run(const Subject& subject, const std::vector<std::string>& names) {
+// What the poses were made for; after a move the reference has to tell.
+std::vector<Contact> Comparison::expected_contacts(const Subject& subject) {
     const auto& at = poses(subject);
-    Entry &a = entry(subject.a), &b = entry(subject.b);
+    std::vector<Contact> out(at.size(), subject.kind.starts_with("touching") ? Contact::meeting : Contact::apart);
+    if (subject.query == Query::again)
+        for (size_t i = 0; i < at.size(); ++i)
+            out[i] = reference_meets(subject, at[i]) ? Contact::meeting : Contact::apart;
+    return out;
+}
+
+// Counts wrong answers, and what the queries looked at.
+void Comparison::judge(const Subject& subject, Scene& scene, const Truth& truth, Outcome& outcome) {
+    const size_t count = poses(subject).size();
+    const bool measures = subject.query == Query::distance;
+    size_t enclosed = 0, missed = 0;
+    double worst = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const Work work = measures ? scene.distance_work(i) : scene.collide_work(i);
+        add(outcome.volume_tests, work.volume_tests, count);
+        add(outcome.triangle_tests, work.triangle_tests, count);
+        if (measures) {
+            const double error = std::abs(scene.distance(i) - truth.distances[i]);
+            worst = std::max(worst, error), outcome.wrong += !(error <= kDistanceError);
+        } else {
+            const Contact now = scene.collide(i), expected = truth.contacts[i];
+            if (now == expected) continue;
+            const bool inside = now == Contact::enclosed && expected == Contact::apart;
+            enclosed += inside, outcome.wrong += !inside, missed += !inside && expected == Contact::meeting;
+        }
+    }
+    const std::string who = subject.name() + "/" + outcome.library;
+    if (enclosed > 0)
+        std::fprintf(stderr, "%s: a part of one solid lies inside the other at %zu poses\n", who.c_str(), enclosed);
+    if (outcome.wrong == 0) return;
+    const std::string how = measures ? fmt::format(", by up to {:.3g}", worst)
+                                     : fmt::format(": {} contacts missed, {} reported where surfaces do not meet",
+                                                   missed, outcome.wrong - missed);
+    std::fprintf(stderr, "%s: WRONG at %zu of %zu poses%s\n", who.c_str(), outcome.wrong, count, how.c_str());
+}
+
+std::vector<Outcome> Comparison::run(const Subject& subject, const std::vector<std::string>& names) {
     std::vector<Outcome> out;
     std::vector<std::unique_ptr<Scene>> scenes;
-    for (const auto& library : libraries_) {
+    for (const auto& library : libraries_for(subject)) {
         if (std::ranges::find(names, library->name()) == names.end()) continue;
-        for (Entry* e : {&a, &b})
-            if (auto& shape = e->shapes[library->name()]; !shape) shape = library->build(*e->model);
-        const auto &shape_a = a.shapes[library->name()], &shape_b = b.shapes[library->name()];
-        if (!shape_a || !shape_b) continue;
-        scenes.push_back(library->place(*shape_a, *shape_b, at));
+        const Shape *const a = shape(subject.a, *library), *const b = shape(subject.b, *library);
+        if (a == nullptr || b == nullptr) continue;
+        scenes.push_back(library->place(*a, *b, poses(subject)));
         out.push_back({library->name(), {}, {}, {}, 0});
     }
 
-    const bool distances = subject.query == Query::distance;
-    const Contact expected = subject.kind.starts_with("touching") ? Contact::meeting : Contact::apart;
-    const auto expected_distance = distances ? expected_distances(subject, scenes) : std::vector<double>{};
+    const bool measures = subject.query == Query::distance;
+    Truth truth;
+    if (measures)
+        truth.distances = expected_distances(subject, scenes);
+    else
+        truth.contacts = expected_contacts(subject);
     std::vector<std::function<void(size_t)>> queries;
     for (size_t k = 0; k < scenes.size(); ++k) {
         Scene* const scene = scenes[k].get();
-        size_t enclosed = 0;
-        double worst = 0;
-        for (size_t i = 0; i < at.size(); ++i) {
-            const Work work = distances ? scene->distance_work(i) : scene->collide_work(i);
-            add(out[k].volume_tests, work.volume_tests, at.size());
-            add(out[k].triangle_tests, work.triangle_tests, at.size());
-            if (distances) {
-                const double error = std::abs(scene->distance(i) - expected_distance[i]);
-                worst = std::max(worst, error), out[k].wrong += !(error <= kDistanceError);
-            } else {
-                const Contact now = scene->collide(i);
-                if (now == Contact::enclosed && expected == Contact::apart)
-                    ++enclosed;
-                else
-                    out[k].wrong += now != expected;
-            }
-        }
-        const std::string who = subject.name() + "/" + out[k].library;
-        if (enclosed > 0)
-            std::fprintf(stderr, "%s: a part of one solid lies inside the other at %zu poses\n", who.c_str(), enclosed);
-        if (out[k].wrong > 0 && distances)
-            std::fprintf(stderr, "%s: WRONG at %zu of %zu poses, by up to %g\n", who.c_str(), out[k].wrong, at.size(),
-                         worst);
-        else if (out[k].wrong > 0)
-            std::fprintf(stderr, "%s: WRONG at %zu of %zu poses, where the surfaces %s\n", who.c_str(), out[k].wrong,
-                         at.size(), expected == Contact::meeting ? "meet" : "do not meet");
-        if (distances)
+        judge(subject, *scene, truth, out[k]);
+        if (measures)
             queries.emplace_back([scene](size_t i) { scene->distance(i); });
         else
             queries.emplace_back([scene](size_t i) { scene->collide(i); });
     }
-    const bool batch = !distances && subject.kind.starts_with("far");
-    const auto timings = time_in_sweeps(queries, at.size(), {.batch = batch, .seconds = options_.seconds});
+    const bool batch = !measures && subject.kind.starts_with("far");
+    const auto timings = time_in_sweeps(queries, poses(subject).size(), {.batch = batch, .seconds = options_.seconds});
     for (size_t k = 0; k < out.size(); ++k) out[k].timing = timings[k];
     return out;
 }
 
-size_t Comparison::bytes(const std::string& library, const std::string& model) const {
-    const auto at = models_.find(model);
-    if (at == models_.end()) return 0;
-    const auto shape = at->second.shapes.find(library);
-    return shape == at->second.shapes.end() || !shape->second ? 0 : shape->second->bytes();
+std::vector<Memory> Comparison::memory() const {
+    std::vector<Memory> out;
+    for (const auto& [model, e] : models_)
+        for (const auto& [form, built] : e.shapes)
+            if (built.shape) out.push_back({model_name(model), form, e.model->mesh.triangles.size(), built.bytes});
+    return out;
+}
+
+Libraries proxy_libraries(uint32_t leaves, [[maybe_unused]] const std::string& python) {
+    Libraries out;
+    add_prolate_proxy(out, leaves);
+#ifdef PROLATE_BENCH_BULLET
+    add_bullet_hulls(out, python);
+#endif
+    return out;
 }
 
 } // namespace prolate::bench::peers

@@ -41,11 +41,6 @@ public:
         tree_.addSubModel(points, triangles);
         tree_.endModel();
     }
-    size_t bytes() const override {
-        return static_cast<size_t>(tree_.getNumBVs()) * sizeof(fcl::BVNode<Volume>) +
-               static_cast<size_t>(tree_.num_vertices) * sizeof(fcl::Vector3<double>) +
-               static_cast<size_t>(tree_.num_tris) * (sizeof(fcl::Triangle) + sizeof(unsigned));
-    }
     const fcl::BVHModel<Volume>& tree() const { return tree_; }
 
 private:
@@ -101,7 +96,9 @@ public:
     std::string about() const override {
         return "FCL " FCL_VERSION " as Debian compiles it (-O2, SSE2), double precision, first contact only";
     }
-    bool has_distance() const override { return std::is_same_v<Volume, fcl::OBBRSS<double>>; }
+    bool answers(Query query) const override {
+        return query == Query::collide || (query == Query::distance && std::is_same_v<Volume, fcl::OBBRSS<double>>);
+    }
     std::unique_ptr<Shape> build(const Model& model) const override {
         return std::make_unique<FclShape<Volume>>(model);
     }

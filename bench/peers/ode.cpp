@@ -38,7 +38,6 @@ public:
     }
     OdeShape(const OdeShape&) = delete;
     ~OdeShape() override { dGeomTriMeshDataDestroy(data_); }
-    size_t bytes() const override { return 0; }
     dTriMeshDataID data() const { return data_; }
 
 private:

@@ -11,8 +11,8 @@ using scenes::Point;
 using scenes::Random;
 
 constexpr double kSpread = 0.01; // of the diagonal, which is 1
-constexpr double kApart = 1.05;  // no unit diagonals meet at this distance of their middles
-constexpr int kBisections = 14;  // down to 1.05 / 2^14 = 0.006 % of the diagonal
+constexpr double kApart = 1.5;   // beyond it, neither unit diagonals meet nor the covers around them
+constexpr int kBisections = 14;  // down to 0.01 % of the diagonal
 
 // One of the 24 rotations that map the axes onto axes.
 Quat cube_rotation(Random& random) {
@@ -26,7 +26,7 @@ Quat cube_rotation(Random& random) {
 
 } // namespace
 
-PoseSets make_poses(const Reference& a, const Reference& b, size_t count, uint64_t seed, bool aligned) {
+PoseSets make_poses(const std::function<bool(const Placement&)>& meet, size_t count, uint64_t seed, bool aligned) {
     Random random(seed);
     PoseSets out;
     while (out.near.size() < count) {
@@ -43,15 +43,35 @@ PoseSets make_poses(const Reference& a, const Reference& b, size_t count, uint64
         };
         const double up = random.unit(), down = random.unit(), away = random.in(2, 4);
         double low = 0, high = kApart;
-        if (!meet(a, b, at(low))) continue;
+        if (!meet(at(low))) continue;
         for (int i = 0; i < kBisections; ++i) {
             const double middle = (low + high) / 2;
-            (meet(a, b, at(middle)) ? low : high) = middle;
+            (meet(at(middle)) ? low : high) = middle;
         }
         const double room = kSpread - (high - low); // near and touching count from the true contact
         const Placement near = at(high + room * up), touching = at(low - room * down);
-        if (meet(a, b, near) || !meet(a, b, touching)) continue; // there is another contact on the way
+        if (meet(near) || !meet(touching)) continue; // there is another contact on the way
         out.near.push_back(near), out.touching.push_back(touching), out.far.push_back(at(away));
+    }
+    return out;
+}
+
+std::vector<Placement> moved(std::span<const Placement> poses, uint64_t seed) {
+    constexpr double kStep = 5e-4; // by turning as by shifting; no point is more than 0.5 from the middle
+    Random random(seed);
+    std::vector<Placement> out;
+    for (Placement p : poses) {
+        p.before = p.b;
+        const Point shift = random.direction(), axis = random.direction();
+        Vec3& t = p.b.translation;
+        t = scenes::to_float({t.x + kStep * shift[0], t.y + kStep * shift[1], t.z + kStep * shift[2]});
+        const double x = kStep * axis[0], y = kStep * axis[1], z = kStep * axis[2]; // half of an angle of 2 kStep
+        const Quat q = p.b.rotation;
+        p.b.rotation = {static_cast<float>(q.x + x * q.w + y * q.z - z * q.y),
+                        static_cast<float>(q.y + y * q.w + z * q.x - x * q.z),
+                        static_cast<float>(q.z + z * q.w + x * q.y - y * q.x),
+                        static_cast<float>(q.w - x * q.x - y * q.y - z * q.z)};
+        out.push_back(p);
     }
     return out;
 }

@@ -15,6 +15,7 @@ namespace prolate::bench::peers {
 
 struct Placement {
     Pose a, b;
+    Pose before; ///< where B was a moment ago, for queries that remember it
 };
 
 class Reference {

@@ -15,9 +15,10 @@ const Outcome* find(const std::vector<Outcome>& outcomes, const std::string& lib
 }
 
 std::string number(double value) { // three digits that count
-    return value >= 99.95   ? fmt::format("{:.0f}", value)
-           : value >= 9.995 ? fmt::format("{:.1f}", value)
-                            : fmt::format("{:.2f}", value);
+    return value >= 99.95     ? fmt::format("{:.0f}", value)
+           : value >= 9.995   ? fmt::format("{:.1f}", value)
+           : value >= 0.09995 ? fmt::format("{:.2f}", value)
+                              : fmt::format("{:.4f}", value);
 }
 
 std::string cell(const Outcome* outcome, const Outcome* own) {
@@ -55,21 +56,52 @@ std::string block(const Results& results, const std::vector<std::string>& librar
     return out + "\n";
 }
 
+// Results of one kind of query, which the same libraries answer.
+std::string table_of_kind(const Results& results) {
+    std::vector<std::string> libraries{kOwn}, telling;
+    const auto note = [](std::vector<std::string>& names, const std::string& name) {
+        if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+    };
+    for (const auto& [name, outcomes] : results)
+        for (const Outcome& o : outcomes) {
+            note(libraries, o.library);
+            if (o.volume_tests || o.triangle_tests) note(telling, o.library);
+        }
+    std::string out =
+        "\nMedian of a query, us, and how many times that of prolate it is (!n: n answers are wrong)\n\n" +
+        block(results, libraries, [](const auto& outcomes, const std::string& library) {
+            return cell(find(outcomes, library), find(outcomes, kOwn));
+        });
+    if (telling.empty()) return out;
+    return out + "\nBounding volumes + triangles tested in a query, on average\n\n" +
+           block(results, telling,
+                 [](const auto& outcomes, const std::string& library) { return work(find(outcomes, library)); });
+}
+
 } // namespace
 
 std::string table(const Results& results) {
-    std::vector<std::string> libraries{kOwn};
-    for (const auto& [name, outcomes] : results)
-        for (const Outcome& o : outcomes)
-            if (std::ranges::find(libraries, o.library) == libraries.end()) libraries.push_back(o.library);
-    return "\nMedian of a query, us, and how many times that of prolate it is (!n: n answers are wrong)\n\n" +
-           block(results, libraries,
-                 [](const auto& outcomes, const std::string& library) {
-                     return cell(find(outcomes, library), find(outcomes, kOwn));
-                 }) +
-           "\nBounding volumes + triangles tested in a query, on average\n\n" +
-           block(results, libraries,
-                 [](const auto& outcomes, const std::string& library) { return work(find(outcomes, library)); });
+    std::vector<std::pair<std::string, Results>> kinds; // in the order of their first results
+    for (const auto& result : results) {
+        const std::string kind = result.first.substr(0, result.first.find('/'));
+        auto at = std::ranges::find(kinds, kind, &std::pair<std::string, Results>::first);
+        if (at == kinds.end()) at = kinds.insert(at, {kind, {}});
+        at->second.push_back(result);
+    }
+    std::string out;
+    for (const auto& [kind, of_kind] : kinds) out += table_of_kind(of_kind);
+    return out;
+}
+
+std::string table(const std::vector<Memory>& memory) {
+    std::string out = "\nMegabytes of a model\n\n", model;
+    for (const Memory& m : memory) {
+        if (m.model != model)
+            out += fmt::format("{}{} ({} triangles):", model.empty() ? "" : "\n", m.model, m.triangles);
+        model = m.model;
+        out += fmt::format("  {} {}", m.library, number(static_cast<double>(m.bytes) * 1e-6));
+    }
+    return memory.empty() ? "" : out + "\n";
 }
 
 } // namespace prolate::bench::peers

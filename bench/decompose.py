@@ -1,7 +1,7 @@
 """Runs one convex decomposition, for bench/cover.
 
-    peers.py list                           names of those that are installed, a line each
-    peers.py NAME COUNT SECONDS IN OUT      at most COUNT hulls of the Wavefront mesh IN, into OUT
+    decompose.py list                           names of those that are installed, a line each
+    decompose.py NAME COUNT SECONDS IN OUT      at most COUNT hulls of the Wavefront mesh IN, into OUT
 
 OUT has the hulls one after the other, each a closed surface oriented outwards. The last line of the standard output is
 the cost, as JSON. A run of more than SECONDS is killed by SIGALRM.
