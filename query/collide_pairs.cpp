@@ -1,9 +1,9 @@
 // collide() for batches: the test of separation.hpp in single precision, as many pairs at once as there are lanes.
 //
 // All pairs are evaluated once, and those that stay undecided put on a list, to be evaluated on in full groups. Where
-// most of a group stayed undecided, the next group goes on at once. A pair undecided after kMaxLaneEvaluations goes to
-// double precision. What a pair goes through does not depend on its neighbours, so that neither do its answer and the
-// counters.
+// more than a quarter of a group stayed undecided, the next group goes on at once. A pair undecided after
+// kMaxLaneEvaluations goes to double precision. What a pair goes through does not depend on its neighbours, so that
+// neither do its answer and the counters.
 //
 // Rounding, v = 2^-24. Each body comes with a bound of its own errors (pairs.cpp: slack); else its floats are exact.
 // Norms as in separation.hpp; n is m below, of any length; P = |n| |r|.
@@ -31,9 +31,12 @@
 // bodies are apart: the greater of t1 and t2 is at least q, and its error at most 0.9 q mu e. To pass, mu e <= det N
 // and q det N - 0.9 q mu e + mu e <= det N, that is (q - 1) det N <= (0.9 q - 1) mu e < (q - 1) mu e: not both can be.
 //
-// The det N of needles and discs is no larger than that. The careful test, made of pairs that the quick one leaves
-// twice, does without: w = mu L1^T m, of whatever length it is, gives a point of A, and radial_in_b() tells whether it
-// lies in B.
+// The det N of needles and discs is no larger than that; and (2) holds late, for its point is off by what rho is. The
+// careful test, of what the quick ones leave, takes another: z = c1 + t L1 (w / a), w = L1^T m, on the way from A's
+// center to its point farthest along m, at t = p / (a + b), where the slabs of both bodies overlap half and half. For
+// the best rho it is that of (2); else it is as near to a common point as the gap along m is to the greatest, which is
+// of second order in what rho is off. w and t, as computed, are what they are: z lies in A if |w| t <= a, for which a
+// is taken 16 v larger (2.5 v of the length, 8 v of the products), and radial_in_b() tells whether it lies in B.
 #include "query/targets.hpp"
 
 #include <prolate/pairs.hpp>
@@ -54,8 +57,7 @@
 namespace prolate::query {
 
 inline constexpr uint32_t kMaxLaneEvaluations = 5;
-inline constexpr uint32_t kCarefulFrom = 3; // evaluation from which on the careful test is made
-inline constexpr size_t kChunk = 512;       // pairs between lists
+inline constexpr size_t kChunk = 512; // pairs between lists
 
 // Pairs that are still undecided: which, after how many evaluations, and with which rho to go on. A pair that waits
 // after the first evaluation does that anew: it is rare, and the first evaluation is so the leaner.
@@ -105,6 +107,7 @@ struct Evaluation {
     F mu, lambda, det;
     Vector wa, wb;  // L^T m
     F aa, bb, a, b; // their lengths
+    F p;            // m.r
     Mask separated, overlapping;
 };
 
@@ -118,16 +121,18 @@ HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, const Lim
     e.wa = p.a.transposed_times(m), e.wb = p.b.transposed_times(m);
     e.aa = dot(e.wa, e.wa), e.bb = dot(e.wb, e.wb), e.a = hn::Sqrt(e.aa), e.b = hn::Sqrt(e.bb);
     const F length = hn::Abs(m.x) + hn::Abs(m.y) + hn::Abs(m.z);
-    e.separated = hn::Gt(dot(m, p.r) - e.a - e.b, limits.gap * length + set(kUnderflow));
+    e.p = dot(m, p.r);
+    e.separated = hn::Gt(e.p - e.a - e.b, limits.gap * length + set(kUnderflow));
     const F room = e.det - set(32 * kV);
     e.overlapping = hn::And(hn::Le(e.mu * (e.a + limits.error), room), hn::Le(e.lambda * (e.b + limits.error), room));
     return e;
 }
 
-// The careful test.
+// The careful test. Products with mu are about 1, whatever the unit of lengths.
 HWY_INLINE Mask overlapping(const Pairs& p, const Evaluation& e) {
-    return hn::And(hn::Le(e.mu * (e.a + set(kUnderflow)), e.det * set(1 - 16 * kV)),
-                   hn::Le(radial_in_b(p, e.wa * e.mu, e.det), set(1)));
+    const F both = e.a + e.b, at = (e.a + set(kUnderflow)) * e.mu * (both * e.mu) * set(1 + 16 * kV);
+    return hn::And(hn::And(hn::Le(hn::Abs(e.p), both), hn::Gt(at, set(0x1p-90f))),
+                   hn::Le(radial_in_b(p, e.wa * e.mu * (e.p * e.mu), at), set(1)));
 }
 
 // Newton's step of separation.cpp, brought to one fraction: with c = rho b^2 and h = rho^2 w.adj(Q) w / det(Q), w = Q2
@@ -156,7 +161,7 @@ public:
             uint32_t undecided = 0; // of a group, after its first evaluation
             for (uint32_t first = 0; first < count; first += static_cast<uint32_t>(width())) {
                 const uint32_t size = std::min(count - first, static_cast<uint32_t>(width()));
-                undecided = 2 * undecided > width() ? many(first, size) : one(first, size);
+                undecided = undecided > width() / 4 ? many(first, size) : one(first, size);
             }
             for (size_t first = 0; first < waiting_.count; first += width()) go_on(first);
         }
@@ -170,6 +175,7 @@ private:
         const Pairs p(bodies_.world.data(), full(first, size, repeated));
         const Evaluation e = evaluate(p, first_weights(p), Limits(p, lane_margin_));
         uint32_t left = ((1u << size) - 1) & ~bits(hn::Or(e.separated, e.overlapping));
+        if (left != 0) left &= ~bits(overlapping(p, e));
         write(first, size, bits(e.separated));
         const auto undecided = static_cast<uint32_t>(std::popcount(left));
         stats_.evaluations += size - undecided;
@@ -200,7 +206,7 @@ private:
         for (uint32_t i = 0; i < size; ++i) out[i] = static_cast<Verdict>(~separated >> i & 1);
     }
 
-    // The same, and on, while most are undecided.
+    // The same, and on, while more than a quarter are undecided.
     HWY_NOINLINE uint32_t many(uint32_t first, uint32_t size) {
         IndexPair repeated[8];
         const Pairs p(bodies_.world.data(), full(first, size, repeated));
@@ -211,11 +217,11 @@ private:
             stats_.evaluations += static_cast<uint32_t>(std::popcount(left));
             const Evaluation e = evaluate(p, weights, limits);
             separated |= left & bits(e.separated);
-            left &= ~bits(hn::Or(e.separated, e.overlapping));
+            left &= ~bits(hn::Or(hn::Or(e.separated, e.overlapping), overlapping(p, e)));
             if (done == 0) undecided = static_cast<uint32_t>(std::popcount(left));
-            if (++done >= kCarefulFrom) left &= ~bits(overlapping(p, e));
+            ++done;
             rho = next(p, e, rho);
-            if (2 * static_cast<uint32_t>(std::popcount(left)) <= width() || done == kMaxLaneEvaluations) break;
+            if (static_cast<size_t>(std::popcount(left)) <= width() / 4 || done == kMaxLaneEvaluations) break;
         }
         write(first, size, separated);
         float rhos[8];
@@ -254,8 +260,7 @@ private:
             for (uint32_t separated = left & bits(e.separated); separated != 0; separated &= separated - 1)
                 verdict_of(waiting_.at[first + static_cast<size_t>(std::countr_zero(separated))]) = Verdict::separated;
             times = times + set(1);
-            const Mask careful = hn::And(hn::Ge(times, set(kCarefulFrom)), overlapping(p, e));
-            left &= ~bits(hn::Or(hn::Or(e.separated, e.overlapping), careful));
+            left &= ~bits(hn::Or(hn::Or(e.separated, e.overlapping), overlapping(p, e)));
             rho = next(p, e, rho);
         }
     }

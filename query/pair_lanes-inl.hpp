@@ -181,8 +181,9 @@ HWY_INLINE F radial_in_b(const Pairs& p, const Vector& w, F det) {
     const Vector solution = Vector{x * (p.b.l22 * p.b.l33), t2 * p.b.l33, t3} * inverse;
     const F radial =
         hn::Sqrt(dot(solution, solution)) * set(1 + 16 * kV) + p.b.thinness * (p.slack + set(2 * kV) * p.distance());
-    // Above this, what underflows is less than v of the denominator.
-    return hn::IfThenElse(hn::Gt(denominator, set(0x1p-90f)), radial, set(2));
+    // Above the first, what underflows is less than v of the denominator; an infinite one would make nothing of y.
+    const Mask in_range = hn::And(hn::Gt(denominator, set(0x1p-90f)), hn::Lt(denominator, set(0x1p120f)));
+    return choose(in_range, radial, set(2));
 }
 
 } // namespace prolate::query::HWY_NAMESPACE
