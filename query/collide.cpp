@@ -232,11 +232,12 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, co
            query::kSeparationMargin * (2 * root_b.reach + before.distance + now.distance);
 }
 
-// The roots' bounding spheres, roughly, are so far apart.
-double gap_of_spheres(const query::Descent& d) {
-    const query::PlacedEllipsoid a = query::place(d.a.tree.ellipsoid(0)),
-                                 b = query::place(d.b.tree.ellipsoid(0), d.b_to_a);
-    return glm::distance(a.center, b.center) - a.size - b.size;
+// The bodies are certainly so far apart, by spheres around their roots; NaN if the pose is not finite.
+double gap_of_spheres(const TreeView& a, const TreeView& b, const query::RelativePose& b_to_a) {
+    const query::PlacedEllipsoid root_a = query::place(a.ellipsoid(0)), root_b = query::place(b.ellipsoid(0));
+    const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
+    return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
+           query::kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
 }
 
 // Does the pair that the cache names exist?
@@ -284,8 +285,15 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     }
 
     const bool swap = query::must_swap(a, pose_a, b, pose_b);
-    query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
-                                  : query::Descent(a, pose_a, b, pose_b, context, options);
+    const TreeView &first = swap ? b : a, &second = swap ? a : b;
+    const query::RelativePose to_first =
+        swap ? query::relative_pose(pose_b, pose_a) : query::relative_pose(pose_a, pose_b);
+    const double gap = gap_of_spheres(first, second, to_first); // most pairs of a scene, at a fifth of the cost
+    if (gap > options.margin && options.max_pair_tests > 0) {
+        if (cache) *cache = {Verdict::separated, {}, static_cast<float>(gap * kRoundDown), pose_a, pose_b};
+        return {Verdict::separated, false, {}, {.pair_tests = 1}};
+    }
+    query::Descent descent(first, second, to_first, context, options);
     MeetingPair pair;
     descent.pairs = {&pair, 1};
     const auto answer = [&](Verdict verdict) {
@@ -307,8 +315,7 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
                             : std::clamp(kSkinSteps * moved, kThinnestSkin * smaller, kThickestSkin * smaller);
     descent.set_skin(static_cast<float>(skin));
     const CollideResult result = answer(run(descent));
-    double distance = options.margin + descent.skin;
-    if (!descent.roots_meet) distance = std::max(distance, gap_of_spheres(descent));
+    const double distance = double{options.margin} + descent.skin;
     *cache = {result.verdict, result.pair, static_cast<float>(distance * kRoundDown), pose_a, pose_b};
     return result;
 }

@@ -44,8 +44,11 @@ struct Descent {
     float skin = 0;
     bool roots_meet = false;
 
+    Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, QueryContext& context,
+            const QueryOptions& query_options) noexcept;
     Descent(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
-            QueryContext& context, const QueryOptions& query_options) noexcept;
+            QueryContext& context, const QueryOptions& query_options) noexcept
+        : Descent(tree_a, tree_b, relative_pose(pose_a, pose_b), context, query_options) {}
 
     /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query.
     bool meet(uint32_t node_a, uint32_t node_b) noexcept;

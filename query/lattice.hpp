@@ -3,18 +3,13 @@
 #pragma once
 
 #include "query/separation.hpp"
+#include "src/power_of_two.hpp"
 
 #include <prolate/tree.hpp>
 
-#include <bit>
 #include <cstdint>
 
 namespace prolate::query {
-
-/// 2^exponent, |exponent| <= 1000: exact, and cheaper than std::ldexp.
-inline double power_of_two(int32_t exponent) {
-    return std::bit_cast<double>(static_cast<uint64_t>(1023 + exponent) << 52);
-}
 
 /// From one body's lattice coordinates to another's: x_to = linear x_from + offset, where `linear` is a rotation times
 /// `scale`. All NaN if the relative pose is.

@@ -23,15 +23,15 @@ Body body(const TreeView& tree, uint32_t max_level) noexcept {
 }
 
 uint32_t Body::deepest_level() const noexcept {
-    uint32_t level = tree.level_count() - 1;
-    while (level > 0 && deepest < tree.first_slot(level)) --level;
+    uint32_t level = 0;
+    while (level + 1 < tree.level_count() && deepest >= tree.first_slot(level + 1)) ++level;
     return level;
 }
 
-Descent::Descent(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
-                 QueryContext& context, const QueryOptions& query_options) noexcept
-    : a(body(tree_a, query_options.max_level)), b(body(tree_b, query_options.max_level)),
-      b_to_a(relative_pose(pose_a, pose_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
+Descent::Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, QueryContext& context,
+                 const QueryOptions& query_options) noexcept
+    : a(body(tree_a, query_options.max_level)), b(body(tree_b, query_options.max_level)), b_to_a(pose_b_to_a),
+      lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
       lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(query_options),
       stack(context.entries) {}
 

@@ -3,6 +3,7 @@
 
 #include "src/block.hpp"
 #include "src/bytes.hpp"
+#include "src/power_of_two.hpp"
 
 #include <algorithm>
 #include <cassert>
@@ -88,11 +89,11 @@ void store_boxes(std::byte* block, std::span<const PackedNode> siblings, const L
 }
 
 Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept {
-    const float step = std::ldexp(1.0f, lattice.step_exponent);
+    const auto step = static_cast<float>(power_of_two(lattice.step_exponent));
     const auto coordinate = [&](size_t i) {
         return static_cast<float>(lattice.origin[i] + int32_t{node.center[i]}) * step;
     };
-    const float half_unit = std::ldexp(1.0f, node.exponent - 15);
+    const auto half_unit = static_cast<float>(power_of_two(node.exponent - 15)); // perhaps subnormal
     const auto diagonal = [&](size_t i) { return static_cast<float>(node.diagonal[i]) * (half_unit * 0.5f); };
     const auto off = [&](size_t i) { return static_cast<float>(node.off_diagonal[i]) * half_unit; };
     return {.center = {coordinate(0), coordinate(1), coordinate(2)},

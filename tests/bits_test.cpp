@@ -113,7 +113,7 @@ TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
 }
 
 TEST(Bits, Collide) {
-    expect_bits(14174599880938214952u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(17728641125298994870u, [](Bits& bits, const Scenes::Pair& p) {
         const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
         PairCache cache;
