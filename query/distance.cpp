@@ -28,6 +28,9 @@
 #include "query/enclosure.hpp"
 #include "query/heap.hpp"
 #include "query/order.hpp"
+#include "src/layout.hpp"
+
+#include <hwy/cache_control.h>
 
 #include <algorithm>
 #include <bit>
@@ -46,13 +49,50 @@ class Search {
 
 public:
     explicit Search(DistanceSearch& query)
-        : q_(query), heap_(query.entries), step_a_(power_of_two(query.a.lattice.step_exponent)),
-          step_b_(power_of_two(query.b.lattice.step_exponent)) {
+        : q_(query), heap_(query.entries), sides_{{query.a, query.lattice_b_to_a}, {query.b, query.lattice_a_to_b}} {
         const auto children = [](const TreeView& tree) { return uint64_t{tree.degree()} * (tree.level_count() - 1); };
         room_ = static_cast<uint32_t>(QueryContext::kEntries - kMaxDegree - children(q_.a.tree) - children(q_.b.tree));
     }
 
     void run() {
+        search();
+        for (const Side& side : sides_)
+            for (const double bound : side.skipped) q_.skipped = std::min(q_.skipped, bound * side.step);
+        q_.a.deepest = sides_[0].deepest, q_.b.deepest = sides_[1].deepest;
+    }
+
+private:
+    // Nodes that were placed before: every third or so is tested against another block soon.
+    static constexpr uint32_t kPlaced = 8;
+    struct Placed {
+        uint32_t node = UINT32_MAX;
+        Single single;
+        PlacedBox box;
+    };
+    // One of the bodies, as that whose children are tested.
+    struct Side {
+        Side(const Body& body, const LatticePose& other_to_here)
+            : blocks(body.tree.block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
+              limit_from(body.limit_from), pose(other_to_here), step(power_of_two(step_exponent)),
+              per_step(power_of_two(-step_exponent)) {
+            if (body.tree.has_triangles()) triangles = body.tree.triangle_bytes();
+            triangle_bytes = static_cast<uint32_t>(3 * index_bytes(body.tree.vertex_count()));
+            std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);
+        }
+        const std::byte* block(uint32_t slot) const { return blocks + size_t{slot / kBlockLanes} * kBlockBytes; }
+
+        const std::byte* blocks;
+        int32_t step_exponent;
+        uint32_t leaves_from, limit_from, deepest = 0;
+        const std::byte* triangles = nullptr;
+        uint32_t triangle_bytes;
+        const LatticePose& pose;
+        double step, per_step;
+        alignas(64) double skipped[kBlockLanes]; // least bound of the nodes that were skipped in each lane, steps
+        Placed placed[kPlaced];                  // of the other body's nodes
+    };
+
+    void search() {
         q_.open = 0;
         if (budget() < 1) return;
         q_.open = DistanceSearch::kInfinity;
@@ -68,13 +108,12 @@ public:
             } else {
                 if (!open(e)) return stop_at(e);
                 if (count_ > 0) {
-                    std::swap(*std::min_element(children_, children_ + count_, nearer), children_[count_ - 1]);
-                    const Entry nearest = children_[count_ - 1]; // a copy: depth_first() needs the room
+                    const Entry nearest = children_[--count_];
                     const bool go_on = descending || heap_.empty() || nearest.bound <= heap_.top().bound;
-                    const uint32_t others = count_ - (go_on ? 1 : 0);
-                    if (heap_.size() + others <= room_) {
-                        for (uint32_t i = 0; i < others; ++i) heap_.push(children_[i]);
-                    } else if (!depth_first(others)) {
+                    if (!go_on) ++count_;
+                    if (heap_.size() + count_ <= room_) {
+                        for (uint32_t i = 0; i < count_; ++i) heap_.push(children_[i]);
+                    } else if (!depth_first()) {
                         return go_on ? stop_at(nearest) : done(false);
                     }
                     if (q_.overlapping) return;
@@ -90,12 +129,10 @@ public:
         }
     }
 
-private:
-    static bool nearer(const Entry& x, const Entry& y) { return x.bound < y.bound; }
     uint64_t budget() const { return q_.options.max_pair_tests - q_.stats.pair_tests; }
     double bound_of(const Entry& e) const { return base_ + double{e.bound}; }
     bool too_deep(const Entry& e) const {
-        return (e.flags & kOpenB) != 0 ? e.node_b >= q_.b.limit_from : e.node_a >= q_.a.limit_from;
+        return (e.flags & kOpenB) != 0 ? e.node_b >= sides_[1].limit_from : e.node_a >= sides_[0].limit_from;
     }
     // Notes a pair that need not be looked at.
     bool skips(double bound) {
@@ -116,56 +153,94 @@ private:
     // The pair of the roots; false if they are far enough apart.
     bool roots(Entry& e) {
         const auto leaf = [](const Body& body) { return body.tree.is_leaf(0) ? 1u : 0u; };
+        const Placed& one = place_other(sides_[1], sides_[0], 0);
         LaneBounds bounds;
-        const Single one = place(q_.a.tree.block(0), 0, q_.lattice_a_to_b);
-        bound_lanes(q_.b.tree.block(0), q_.b.lattice.step_exponent, one, bounds);
+        bound_lanes(sides_[1].block(0), sides_[1].step_exponent, one.single, &one.box, DistanceSearch::kInfinity,
+                    bounds);
         ++q_.stats.pair_tests, ++q_.stats.block_tests;
-        const double bound = bounds.lower[0] * step_b_;
+        const double bound = bounds.lower[0] * sides_[1].step;
         base_ = std::isfinite(bound) ? std::max(bound, 0.0) : root_bound(q_);
         q_.roots_meet = !(base_ > 0);
-        const bool open_b = leaf(q_.b) == 0 && (leaf(q_.a) != 0 || bounds.size[0] > one.size);
+        const bool open_b = leaf(q_.b) == 0 && (leaf(q_.a) != 0 || bounds.size[0] > one.single.size);
         e = {0, 0, 0, (open_b ? kOpenB : 0) | leaf(q_.a) * kLeafA | leaf(q_.b) * kLeafB};
         return !skips(base_);
     }
 
-    // Puts the children of a pair that are not skipped into children_; false if the budget is too small.
+    // Node `node` of the body `from` in the frame of `here`.
+    static HWY_INLINE const Placed& place_other(Side& here, const Side& from, uint32_t node) {
+        Placed& placed = here.placed[node % kPlaced];
+        if (placed.node != node) {
+            placed.single = place_here(from.block(node), node % kBlockLanes, here.pose, &placed.box);
+            placed.node = node;
+        }
+        return placed;
+    }
+
+    // Puts the children of a pair that are not skipped into children_, the nearest last; false if the budget is too
+    // small.
     bool open(const Entry& e) {
         count_ = 0;
-        return (e.flags & kOpenB) != 0 ? open_one<true>(e, q_.b, q_.a, q_.lattice_a_to_b, step_b_)
-                                       : open_one<false>(e, q_.a, q_.b, q_.lattice_b_to_a, step_a_);
-    }
-    template <bool kB>
-    bool open_one(const Entry& e, Body& body, const Body& other, const LatticePose& pose, double step) {
-        const ChildRange children = body.tree.children(kB ? e.node_b : e.node_a);
-        if (children.count > budget()) return false;
-        const uint32_t node = kB ? e.node_a : e.node_b;
-        const Single one = place(other.tree.block(node / kBlockLanes), node % kBlockLanes, pose);
-        const bool other_leaf = (e.flags & (kB ? kLeafA : kLeafB)) != 0;
-        q_.stats.pair_tests += children.count;
-        body.deepest = std::max(body.deepest, children.first + children.count - 1);
-        for (uint32_t i = 0; i < children.count; i += kBlockLanes) {
-            const uint32_t first = children.first + i, count = std::min(children.count - i, kBlockLanes);
-            const std::byte* const block = body.tree.block(first / kBlockLanes);
-            LaneBounds bounds;
-            bound_lanes(block, body.lattice.step_exponent, one, bounds);
-            ++q_.stats.block_tests;
-            const double enough = q_.enough();
-            for (uint32_t lane = 0; lane < count; ++lane) {
-                const double bound = bounds.lower[lane] * step;
-                if (bound >= enough) {
-                    q_.skipped = std::min(q_.skipped, bound);
-                    continue;
-                }
-                const auto stored = static_cast<uint8_t>(block[kBlockCount + lane]);
-                const bool leaf = first >= body.leaves_from || stored == 0 || stored >= kTriangleLeaf;
-                const bool open_this = !leaf && (other_leaf || bounds.size[lane] > one.size);
-                const uint32_t flags = (open_this == kB ? kOpenB : 0) | (leaf ? (kB ? kLeafB : kLeafA) : 0) |
-                                       (e.flags & (kB ? kLeafA : kLeafB));
-                children_[count_++] = {kB ? node : first + lane, kB ? first + lane : node, inherit(e.bound, bound),
-                                       flags};
-            }
-        }
+        const uint32_t side = e.flags & kOpenB;
+        const uint32_t node = side != 0 ? e.node_b : e.node_a, other = side != 0 ? e.node_a : e.node_b;
+        const std::byte* const block = sides_[side].block(node);
+        const uint32_t lane = node % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
+        const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+        if (count > budget()) return false;
+        for (uint32_t i = 0; i < count; i += kBlockLanes)
+            test(e, side, other, first + i, std::min(count - i, kBlockLanes));
+        if (count_ == 0) return true;
+        std::swap(children_[nearest_], children_[count_ - 1]);
         return true;
+    }
+
+    // What opening a node, or looking at a leaf's triangles, will need: they are seldom in the cache.
+    static HWY_INLINE void prefetch(const Side& side, const std::byte* block, uint32_t lane, bool leaf) {
+        const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+        if (leaf) {
+            if (side.triangles != nullptr) hwy::Prefetch(side.triangles + size_t{first} * side.triangle_bytes);
+        } else {
+            const std::byte* const children = side.block(first);
+            for (size_t i = 0; i < kBlockBytes; i += kBlockAlignment) hwy::Prefetch(children + i);
+        }
+    }
+
+    // One block against a node of the other tree.
+    HWY_INLINE void test(const Entry& e, uint32_t open, uint32_t other, uint32_t first, uint32_t count) {
+        Side& side = sides_[open];
+        const std::byte* const block = side.block(first);
+        q_.stats.pair_tests += count, ++q_.stats.block_tests;
+        side.deepest = std::max(side.deepest, first + count - 1);
+        const Placed& one = place_other(side, sides_[open ^ kOpenB], other);
+        const uint32_t other_leaf = e.flags & (open != 0 ? kLeafA : kLeafB);
+        const uint32_t this_leaf = open != 0 ? kLeafB : kLeafA;
+        LaneBounds bounds;
+        bound_lanes(block, side.step_exponent, one.single, &one.box, q_.enough() * side.per_step, bounds);
+        const uint32_t nodes = (1u << count) - 1;
+        note_skipped(bounds, nodes & ~bounds.near, side);
+        for (uint32_t near = bounds.near & nodes; near != 0; near &= near - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(near));
+            const auto stored = static_cast<uint8_t>(block[kBlockCount + lane]);
+            const bool leaf = first >= side.leaves_from || stored == 0 || stored >= kTriangleLeaf;
+            const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
+            if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
+            const uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
+            const double lower = bounds.lower[lane] * side.step; // less than 0: the deeper, the nearer
+            if (count_ == 0 || lower < least_) nearest_ = count_, least_ = lower;
+            const float bound = inherit(e.bound, lower);
+            const uint32_t node = first + lane;
+            children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
+        }
+    }
+    static HWY_INLINE void note_skipped(const LaneBounds& bounds, uint32_t lanes, Side& side) {
+        if (lanes == 0) return;
+        alignas(8) uint8_t bits[8] = {static_cast<uint8_t>(lanes)};
+        const WideTag w;
+        for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(w)) {
+            bits[0] = static_cast<uint8_t>(lanes >> i);
+            const auto bound = hn::IfThenElse(hn::LoadMaskBits(w, bits), hn::Load(w, bounds.lower + i),
+                                              hn::Set(w, DistanceSearch::kInfinity));
+            hn::Store(hn::Min(hn::Load(w, side.skipped + i), bound), w, side.skipped + i);
+        }
     }
     // The greater of a pair's own bound, as it is kept, and its parent's.
     float inherit(float parent, double bound) const {
@@ -174,17 +249,13 @@ private:
         return below > parent ? below : parent;
     }
 
-    // Searches children_[0 ... count - 1] and all below them, nearest first, on the scratch above the heap. False if
-    // the budget runs out.
-    bool depth_first(uint32_t count) {
+    // Searches all children_ and all below them, nearest first, on the scratch above the heap. False if the budget
+    // runs out.
+    bool depth_first() {
         Entry* const stack = q_.entries + heap_.size();
         uint32_t size = 0;
-        const auto push = [&](uint32_t n) {
-            if (n == 0) return;
-            std::swap(*std::min_element(children_, children_ + n, nearer), children_[n - 1]);
-            size = static_cast<uint32_t>(std::copy_n(children_, n, stack + size) - stack);
-        };
-        push(count);
+        const auto push = [&] { size = static_cast<uint32_t>(std::copy_n(children_, count_, stack + size) - stack); };
+        push();
         bool within = true;
         while (size > 0 && !q_.overlapping) {
             const Entry e = stack[--size];
@@ -194,7 +265,7 @@ private:
             } else if (too_deep(e) || !(within = within && open(e))) {
                 q_.open = std::min(q_.open, bound_of(e));
             } else {
-                push(count_);
+                push();
             }
         }
         return within;
@@ -202,10 +273,12 @@ private:
 
     DistanceSearch& q_;
     PairHeap<> heap_;
-    const double step_a_, step_b_; // metres
-    double base_ = 0;              // bound of the roots, metres
-    uint32_t room_;                // of the heap: what depth_first() needs is kept free
-    uint32_t count_ = 0;
+    Side sides_[2];
+    double base_ = 0;      // bound of the roots, metres
+    uint32_t room_;        // of the heap: what depth_first() needs is kept free
+    uint32_t count_ = 0;   // of children_
+    uint32_t nearest_ = 0; // of them, while they are tested, and its own bound
+    double least_ = 0;
     Entry children_[kMaxDegree];
 };
 

@@ -2,6 +2,9 @@
 #include "query/distance_search.hpp"
 #include "query/gap.hpp"
 #include "query/triangle_ellipsoid.hpp"
+#include "query/triangle_lanes.hpp"
+#include "src/bytes.hpp"
+#include "src/layout.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -12,12 +15,24 @@ namespace {
 
 using glm::dvec3;
 
-struct Range {
-    double low, high;
-};
-Range along(const PlacedTriangle& t, const dvec3& n) {
-    const double x = glm::dot(n, t.corner[0]), y = glm::dot(n, t.corner[1]), z = glm::dot(n, t.corner[2]);
-    return {std::min({x, y, z}), std::max({x, y, z})};
+// The greatest n.x of the corners x of some triangles.
+template <class Index> double support(const TreeView& tree, const TriangleRange& range, const dvec3& n) {
+    const std::byte* index = tree.triangle_bytes() + size_t{range.first} * 3 * sizeof(Index);
+    double most = -DistanceSearch::kInfinity;
+    for (uint32_t i = 0; i < 3 * range.count; ++i, index += sizeof(Index)) {
+        const std::byte* const x = tree.vertex_bytes() + size_t{load_le<Index>(index)} * kVertexBytes;
+        const auto at = [x](size_t k) { return double{load_le<float>(x + k * sizeof(float))}; };
+        most = std::max(most, (n.x * at(0) + n.y * at(1)) + n.z * at(2));
+    }
+    return most;
+}
+double support(const TreeView& tree, const TriangleRange& range, const dvec3& n) {
+    return tree.vertex_count() <= 0x10000 ? support<uint16_t>(tree, range, n) : support<uint32_t>(tree, range, n);
+}
+
+// Bounds the distance of an exact tree's corners from its origin: they lie in the root.
+double reach_of_corners(const TreeView& tree) {
+    return place(tree.ellipsoid(0)).reach;
 }
 
 } // namespace
@@ -27,7 +42,7 @@ DistanceSearch::DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const
     : a(body(tree_a, distance_options.max_level)), b(body(tree_b, distance_options.max_level)),
       b_to_a(relative_pose(pose_a, pose_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
       lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(distance_options),
-      entries(context.entries) {}
+      entries(context.entries), corners_reach_(reach_of_corners(tree_a) + reach_of_corners(tree_b) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
     const PlacedEllipsoid x = place(search.a.tree.ellipsoid(0)), y = place(search.b.tree.ellipsoid(0), search.b_to_a);
@@ -43,6 +58,8 @@ void DistanceSearch::take(const TriangleDistance& found, const MeetingPair& pair
     const dvec3 between = on_b - on_a;
     const double length = glm::length(between);
     normal = length > 0 ? between / length : dvec3(0);
+    normal_b = normal * b_to_a.rotation;
+    supports_a_ = supports_b_ = {};
 }
 
 void DistanceSearch::decide(uint32_t node_a, uint32_t node_b) noexcept {
@@ -69,25 +86,36 @@ void DistanceSearch::decide(uint32_t node_a, uint32_t node_b) noexcept {
     }
 }
 
+// A lower bound from `normal`. The terms of triangle.hpp: there B's corners are turned, here the direction, with the
+// same error.
+double DistanceSearch::gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a,
+                                        TriangleRange in_b) noexcept {
+    const auto kept = [](Supports& supports, const TreeView& tree, uint32_t leaf, TriangleRange range, const dvec3& n) {
+        Support& at = supports[leaf % supports.size()];
+        if (at.leaf != leaf) at = {leaf, support(tree, range, n)};
+        return at.reach;
+    };
+    const double gap = (glm::dot(normal, b_to_a.translation) - kept(supports_b_, b.tree, node_b, in_b, -normal_b)) -
+                       kept(supports_a_, a.tree, node_a, in_a, normal);
+    return (gap - kSeparationMargin * corners_reach_) * (1 - 0x1p-50);
+}
+
 void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a,
                                       TriangleRange in_b) noexcept {
-    PlacedTriangle of_a[kMaxLeafTriangles];
-    for (uint32_t i = 0; i < in_a.count; ++i) of_a[i] = place(a.tree, in_a.first + i);
-    for (uint32_t j = 0; j < in_b.count; ++j) {
-        const PlacedTriangle of_b = place(b.tree, in_b.first + j, b_to_a);
-        for (uint32_t i = 0; i < in_a.count && !overlapping; ++i) {
-            // Almost all pairs are far enough apart along the direction of the nearest ones (triangle.hpp).
-            const double gap = along(of_b, normal).low - along(of_a[i], normal).high -
-                               kSeparationMargin * (of_a[i].reach + of_b.reach);
-            if (gap * (1 - 0x1p-50) >= enough()) {
-                skipped = std::min(skipped, gap * (1 - 0x1p-50));
-                continue;
-            }
-            ++stats.triangle_tests;
-            const TriangleDistance found = distance(of_a[i], of_b);
-            take(found, {node_a, node_b, in_a.first + i, in_b.first + j}, !(found.lower > 0));
+    const double limit = enough();
+    if (normal != dvec3(0)) { // almost all leaves are far enough apart along the direction of the nearest ones
+        const double gap = gap_along_normal(node_a, node_b, in_a, in_b);
+        if (gap >= limit) {
+            skipped = std::min(skipped, gap);
+            return;
         }
     }
+    const LeafDistance found = distance_of_leaves(a.tree, in_a, b.tree, in_b, b_to_a,
+                                                  {limit, options.tolerance_absolute, relative_tolerance()}, normal);
+    stats.triangle_tests += found.pair_tests;
+    skipped = std::min(skipped, found.lower);
+    if (found.nearest.upper < kInfinity)
+        take(found.nearest, {node_a, node_b, found.triangle_a, found.triangle_b}, !(found.nearest.lower > 0));
 }
 
 void DistanceSearch::try_first(const MeetingPair& pair) noexcept {

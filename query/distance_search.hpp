@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -33,7 +34,8 @@ struct DistanceSearch {
     double upper = kInfinity;
     MeetingPair witness;
     glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0};
-    glm::dvec3 normal{0, 0, 0}; ///< unit, from on_a to on_b; 0 if they coincide or are not known
+    glm::dvec3 normal{0, 0, 0};   ///< unit, from on_a to on_b; 0 if they coincide or are not known
+    glm::dvec3 normal_b{0, 0, 0}; ///< the same as B's frame has it
 
     DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
                    QueryContext& context, const DistanceOptions& distance_options) noexcept;
@@ -41,11 +43,11 @@ struct DistanceSearch {
     /// What is at least so far apart, > 0, need not be looked at: it cannot improve the answer by more than the
     /// tolerance, nor meet.
     double enough() const {
-        const double relative = std::max(options.tolerance_relative, kLeastTolerance);
-        const double improving = upper - std::max(options.tolerance_absolute, relative * upper);
+        const double improving = upper - std::max(options.tolerance_absolute, relative_tolerance() * upper);
         const double limit = std::min(options.max_distance, improving); // improving may be NaN: inf - inf
         return std::max(upper < kInfinity ? limit : options.max_distance, std::numeric_limits<double>::min());
     }
+    double relative_tolerance() const { return std::max(options.tolerance_relative, kLeastTolerance); }
     double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
 
     /// Decides on two leaves. Sets `overlapping` if they meet.
@@ -57,6 +59,16 @@ struct DistanceSearch {
     static constexpr double kLeastTolerance = 1e-12;
 
 private:
+    // How far the corners of leaves reach along `normal`, or B's against it: few leaves are asked for often.
+    struct Support {
+        uint32_t leaf = UINT32_MAX;
+        double reach;
+    };
+    using Supports = std::array<Support, 16>;
+    Supports supports_a_, supports_b_;
+    double corners_reach_; // share of S (triangle.hpp) of all corners
+
+    double gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
     void take(const TriangleDistance& found, const MeetingPair& pair, bool meet) noexcept;
     void decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
 };

@@ -5,7 +5,6 @@
 
 #include <prolate/query.hpp>
 
-#include <algorithm>
 #include <cstdint>
 
 namespace prolate::query {
@@ -33,19 +32,27 @@ public:
         const Entry top = entries_[0], last = entries_[--size_];
         uint32_t at = 0;
         for (uint32_t child = 1; child < size_; child = 4 * at + 1) {
-            const uint32_t end = std::min(child + 4, size_);
-            uint32_t least = child;
-            for (uint32_t c = child + 1; c < end; ++c)
-                if (Order::before(entries_[c], entries_[least])) least = c;
-            if (!Order::before(entries_[least], last)) break;
-            entries_[at] = entries_[least];
-            at = least;
+            const uint32_t first = child + 4 <= size_ ? sooner(sooner(child, child + 1), sooner(child + 2, child + 3))
+                                                      : first_until_end(child);
+            if (!Order::before(entries_[first], last)) break;
+            entries_[at] = entries_[first];
+            at = first;
         }
         if (size_ > 0) entries_[at] = last;
         return top;
     }
 
 private:
+    // Of two indices, the lower one if their entries are equal. Without a branch: which it is cannot be foretold.
+    uint32_t sooner(uint32_t low, uint32_t high) const {
+        return low + (high - low) * static_cast<uint32_t>(Order::before(entries_[high], entries_[low]));
+    }
+    uint32_t first_until_end(uint32_t child) const {
+        uint32_t first = child;
+        for (uint32_t c = child + 1; c < size_; ++c) first = sooner(first, c);
+        return first;
+    }
+
     Entry* const entries_;
     uint32_t size_ = 0;
 };

@@ -113,9 +113,9 @@ template <class V> HWY_INLINE V sum_of_three(V v) {
 }
 
 /// place() of lanes.hpp, which has the same operations: vectors of four hold x, y, z.
-HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const LatticePose& pose) {
+HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const LatticePose& pose, PlacedBox* box = nullptr) {
 #if HWY_TARGET == HWY_SCALAR
-    return place(block, lane, pose);
+    return place(block, lane, pose, box);
 #else
     const hn::FixedTag<float, 4> d;
     const hn::FixedTag<int32_t, 4> d32;
@@ -198,13 +198,19 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     const auto away = hn::Sub(box_center, hn::ConvertTo(d, stored_center));
     const auto half = hn::Add(hn::Mul(hn::ConvertTo(d, hn::Sub(box_high, box_low)), half_step),
                               hn::Add(hn::Mul(hn::Set(d, kBoxMargin), hn::Abs(box_center)), hn::Set(d, kBoxSlack)));
-    const auto at =
-        hn::Add(center, along(r0, r1, r2, hn::Broadcast<0>(away), hn::Broadcast<1>(away), hn::Broadcast<2>(away)));
-    const auto half_box = hn::Add(slack, along(hn::Abs(r0), hn::Abs(r1), hn::Abs(r2), hn::Broadcast<0>(half),
-                                               hn::Broadcast<1>(half), hn::Broadcast<2>(half)));
+    const auto half_x = hn::Broadcast<0>(half), half_y = hn::Broadcast<1>(half), half_z = hn::Broadcast<2>(half);
+    const auto turned = along(r0, r1, r2, hn::Broadcast<0>(away), hn::Broadcast<1>(away), hn::Broadcast<2>(away));
+    const auto around = along(hn::Abs(r0), hn::Abs(r1), hn::Abs(r2), half_x, half_y, half_z);
+    const auto at = hn::Add(center, turned), half_box = hn::Add(slack, around);
     const auto from = hn::Sub(at, half_box), to = hn::Add(at, half_box);
     hn::Store(hn::IfThenElse(hn::Gt(from, low), from, low), d, s.low);
     hn::Store(hn::IfThenElse(hn::Lt(to, high), to, high), d, s.high);
+    if (box != nullptr) {
+        hn::Store(turned, d, box->center);
+        hn::Store(hn::Mul(r0, half_x), d, box->axis[0]), hn::Store(hn::Mul(r1, half_y), d, box->axis[1]);
+        hn::Store(hn::Mul(r2, half_z), d, box->axis[2]);
+        box->slack = kLaneMargin * hn::GetLane(sum_of_three(hn::Add(hn::Abs(turned), around)));
+    }
     return s;
 #endif
 }

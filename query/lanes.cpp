@@ -51,7 +51,7 @@ void complete(double reach, Single& s) {
 
 } // namespace
 
-Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noexcept {
+Single place(const std::byte* block, uint32_t lane, const LatticePose& pose, PlacedBox* placed_box) noexcept {
     const LaneNode e = load_node(block, lane, pose.exponent_from);
     const LaneBox box = box_of(block, lane);
     Single s{};
@@ -69,13 +69,21 @@ Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noe
     // Cut with the box around the node's own box, as it lies in these coordinates.
     float away[3];
     for (size_t i = 0; i < 3; ++i) away[i] = box.center[i] - e.center[i];
+    float turned[3], around[3]; // the box's center, and half the sides of the box around it
     for (size_t i = 0; i < 3; ++i) {
-        const float at = s.center[i] + (r[0][i] * away[0] + r[1][i] * away[1] + r[2][i] * away[2]);
-        const float half = s.slack + (std::abs(r[0][i]) * box.half[0] + std::abs(r[1][i]) * box.half[1] +
-                                      std::abs(r[2][i]) * box.half[2]);
+        turned[i] = r[0][i] * away[0] + r[1][i] * away[1] + r[2][i] * away[2];
+        around[i] = std::abs(r[0][i]) * box.half[0] + std::abs(r[1][i]) * box.half[1] + std::abs(r[2][i]) * box.half[2];
+        const float at = s.center[i] + turned[i], half = s.slack + around[i];
         if (at - half > s.low[i]) s.low[i] = at - half;
         if (at + half < s.high[i]) s.high[i] = at + half;
     }
+    if (placed_box == nullptr) return s;
+    for (size_t i = 0; i < 3; ++i) {
+        placed_box->center[i] = turned[i];
+        for (size_t c = 0; c < 3; ++c) placed_box->axis[c][i] = r[c][i] * box.half[c];
+    }
+    const auto farthest = [&](size_t i) { return std::abs(turned[i]) + around[i]; };
+    placed_box->slack = kLaneMargin * (farthest(0) + farthest(1) + farthest(2));
     return s;
 }
 

@@ -42,6 +42,14 @@ struct Single {
     double reach; ///< bounds every length that entered it: rounding in double costs less than 2^-44 of it
 };
 
+/// The box of a node where its ellipsoid is a Single: {center + t0 axis[0] + t1 axis[1] + t2 axis[2] : |ti| <= 1}.
+/// Along n it reaches no farther than center.n + sum |axis.n| + slack |n|, in whatever order floats sum that up.
+struct PlacedBox {
+    alignas(16) float center[4];  ///< from the ellipsoid's center
+    alignas(16) float axis[3][4]; ///< half the sides
+    float slack;
+};
+
 /// A node as stored, lattice steps of its own tree.
 struct LaneNode {
     float center[3];
@@ -68,8 +76,8 @@ inline float common_slack(double reach) {
     return kLaneMargin * kLargestCenter + static_cast<float>(0x1p-42 * reach);
 }
 
-/// Node `lane` of `block`, which belongs to the tree that `pose` comes from.
-Single place(const std::byte* block, uint32_t lane, const LatticePose& pose) noexcept;
+/// Node `lane` of `block`, which belongs to the tree that `pose` comes from, and if `box` is not null its box.
+Single place(const std::byte* block, uint32_t lane, const LatticePose& pose, PlacedBox* box = nullptr) noexcept;
 /// An ellipsoid given in metres of a body frame, in the lattice of a tree in the same frame.
 Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexcept;
 

@@ -105,4 +105,11 @@ TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, doub
     return search.result(margin * (a.reach + b.reach));
 }
 
+double gap_along(const PlacedTriangle& a, const PlacedTriangle& b, const dvec3& n) noexcept {
+    double high = glm::dot(n, a.corner[0]), low = glm::dot(n, b.corner[0]);
+    for (size_t i = 1; i < 3; ++i)
+        high = std::max(high, glm::dot(n, a.corner[i])), low = std::min(low, glm::dot(n, b.corner[i]));
+    return ((low - high) - kSeparationMargin * (a.reach + b.reach)) * (1 - 0x1p-50);
+}
+
 } // namespace prolate::query

@@ -27,5 +27,7 @@ struct TriangleDistance {
 };
 /// The margin is a parameter only so that the tests can show that wrong ones are caught.
 TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, double margin = kSeparationMargin) noexcept;
+/// A lower bound from one direction n, of length 1 but for rounding, pointing from A to B.
+double gap_along(const PlacedTriangle& a, const PlacedTriangle& b, const glm::dvec3& n) noexcept;
 
 } // namespace prolate::query

@@ -24,8 +24,8 @@
 //   e <= 20 u R + 80 * 2^-53 S; kPlacementError is 24 u.
 //   differences of corners       2 u R each, and n.(...) of one 6 u |n|_1 R more: 8 u |n|_1 R
 //   gap, of two such and e       (8 + 8 + 2) u |n|_1 R + 2 e |n|_1 <= (58 u R + 160 * 2^-53 S) |n|_1
-// LaneMarginFactors::direction, 64 u, and kSeparationMargin S are demanded, and kUnderflow: numbers below 2^-126 may have been lost. As
-// |n| <= |n|_1, what is found apart here is apart by more than 90 * 2^-53 S, as inside.hpp wants it.
+// LaneMarginFactors::direction, 64 u, and kSeparationMargin S are demanded, and kUnderflow: numbers below 2^-126 may
+// have been lost. As |n| <= |n|_1, what is found apart here is apart by more than 90 * 2^-53 S, as inside.hpp wants it.
 // Volumes: L bounds the coordinates of all edges and of B's corners from A's first, as computed.
 //   n = c x g                    8 u L^2 a coordinate, |n_k| <= 2 L^2
 //   n.x - n.y                    48 u L^3 for n, 12 u L^3 for x and y, 36 u L^3 for the products and sums, 12 u L^3 for

@@ -1,11 +1,14 @@
-// Two leaves of exact trees: does a triangle of one meet a triangle of the other? Float kernels answer for eight pairs
-// at once; what they leave open the scalar test of triangle.hpp decides.
+// Two leaves of exact trees: does a triangle of one meet a triangle of the other, and how far are they apart? Float
+// kernels answer for eight pairs at once; what they leave open the scalar tests of triangle.hpp and
+// triangle_distance.hpp decide.
 #pragma once
 
-#include "query/triangle.hpp"
+#include "query/triangle_distance.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 namespace prolate::query {
 
@@ -48,8 +51,35 @@ struct LeafResult {
 LeafResult test_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                        const RelativePose& b_to_a, double distance = 0, const LaneMarginFactors& factors = {}) noexcept;
 
-/// The kernel alone, for the tests and benchmarks: a call a vector costs more than it does.
+struct LeafDistance {
+    double lower = std::numeric_limits<double>::infinity();                       // no two triangles are nearer
+    TriangleDistance nearest{0, std::numeric_limits<double>::infinity(), {}, {}}; // of the nearest two that were found
+    uint32_t triangle_a = 0, triangle_b = 0;                                      // these
+    uint32_t pair_tests = 0, exact_tests = 0;
+};
+/// Which pairs matter.
+struct NearLimit {
+    double distance = std::numeric_limits<double>::infinity(); // those that are nearer, metres,
+    double absolute = 0, relative = 0; // and than the nearest so far by this, or this share of its distance
+    void lower(double upper) { distance = std::min(distance, upper - std::max(absolute, relative * upper)); }
+};
+/// Pairs that do not matter may be left out: if all are, nearest.upper is infinite. Ends with the first pair whose
+/// lower bound is 0, which is then `nearest`. `normal`, a unit vector or 0, in A's frame: along it the triangles may
+/// well be apart.
+LeafDistance distance_of_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                                const RelativePose& b_to_a, NearLimit limit = {}, const glm::dvec3& normal = {0, 0, 0},
+                                const LaneMarginFactors& factors = {}) noexcept;
+
+/// In the lanes' unit, in which no two are farther apart than kFarLimit.
+struct TriangleBounds {
+    float lower[kLanes];
+};
+inline constexpr float kFarLimit = 16;
+
+/// The kernels alone, for the tests and benchmarks: a call a vector costs more than they do.
 LaneVerdicts test_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,
                         const LaneMarginFactors& factors) noexcept;
+TriangleBounds bound_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,
+                           float limit) noexcept;
 
 } // namespace prolate::query

@@ -160,61 +160,84 @@ HWY_INLINE LaneTriangle pick(const FourTriangles& triangles, const int32_t* inde
     return {{{row_at(0), row_at(1), row_at(2)}, {row_at(3), row_at(4), row_at(5)}, {row_at(6), row_at(7), row_at(8)}}};
 }
 
-/// All pairs of the fours, counted in `result`; true at the first that meets. A's are placed, which gave `most`.
-inline bool test_fours(const TreeView& a, uint32_t first_a, FourTriangles& in_a, Quad most, const TreeView& b,
-                       uint32_t first_b, FourTriangles& in_b, const RelativePose& b_to_a, double distance,
-                       const LaneMarginFactors& factors, LeafResult& result) {
-    const glm::dvec3 corner_a = in_a.first_corner(), corner_b = in_b.first_corner();
-    const glm::dvec3 shift = b_to_a.rotation * corner_b + (b_to_a.translation - corner_a);
-    const float largest = hn::GetLane(hn::MaxOfLanes(QuadTag(), hn::Max(most, in_b.place(b_to_a.rotation, shift))));
-    const float scale = unit_scale(largest);
-    in_a.scale(scale), in_b.scale(scale);
-    // Corners are no farther from the bodies' origins than the first ones and what lies between: the diagonals of
-    // cubes of `largest` and twice that.
-    const double reach =
-        (glm::length(corner_a) + glm::length(corner_b) + 3 * 1.7321 * double{largest} + b_to_a.distance) *
-        double{scale};
-    const LaneMargins margins{.direction = rounded_up(factors.direction + kSeparationMargin * reach),
-                              .corner_error = rounded_up(kPlacementError + 80 * 0x1p-53 * reach),
-                              .distance = rounded_up(distance * double{scale})};
-    const uint32_t count = in_a.count(), pairs = count * in_b.count();
-    const int32_t* const of_a = kPairIndices.remainder[count - 1];
-    const int32_t* const of_b = kPairIndices.quotient[count - 1];
-    for (uint32_t pair = 0; pair < pairs; pair += kLanes) {
-        const auto left = std::min<uint32_t>(pairs - pair, kLanes);
-        const LaneVerdicts verdicts =
-            test_all_lanes([&](size_t lane) { return pick(in_a, of_a + pair + lane); },
-                           [&](size_t lane) { return pick(in_b, of_b + pair + lane); }, margins, factors);
-        for (uint32_t open = ~verdicts.apart & ((1u << left) - 1); open != 0; open &= open - 1) {
-            const auto lane = static_cast<uint32_t>(std::countr_zero(open));
-            const uint32_t i = first_a + static_cast<uint32_t>(of_a[pair + lane]);
-            const uint32_t j = first_b + static_cast<uint32_t>(of_b[pair + lane]);
-            if ((verdicts.meet >> lane & 1) == 0) {
-                ++result.exact_tests;
-                if (apart(query::place(a, i), query::place(b, j, b_to_a), distance)) continue;
-            }
-            result.pair_tests += lane + 1;
-            result.meet = true, result.triangle_a = i, result.triangle_b = j;
-            return true;
-        }
-        result.pair_tests += left;
+/// One to four triangles of each leaf, placed where float lanes take them.
+class FourPair {
+public:
+    /// A's are placed already, which gave `most`.
+    FourPair(FourTriangles& a, Quad most, FourTriangles& b, const RelativePose& b_to_a) : a_(a), b_(b) {
+        const glm::dvec3 corner_a = a.first_corner(), corner_b = b.first_corner();
+        const glm::dvec3 shift = b_to_a.rotation * corner_b + (b_to_a.translation - corner_a);
+        const float largest = hn::GetLane(hn::MaxOfLanes(QuadTag(), hn::Max(most, b.place(b_to_a.rotation, shift))));
+        scale_ = unit_scale(largest);
+        a_.scale(scale_), b_.scale(scale_);
+        // Corners are no farther from the bodies' origins than the first ones and what lies between: the diagonals of
+        // cubes of `largest` and twice that.
+        reach_ = (glm::length(corner_a) + glm::length(corner_b) + 3 * 1.7321 * double{largest} + b_to_a.distance) *
+                 double{scale_};
     }
-    return false;
-}
+    /// Lanes' units in a metre; 0 if there is none.
+    double scale() const { return scale_; }
+    LaneMargins margins(double distance, const LaneMarginFactors& factors) const {
+        return {.direction = rounded_up(factors.direction + kSeparationMargin * reach_),
+                .corner_error = rounded_up(kPlacementError + 80 * 0x1p-53 * reach_),
+                .distance = rounded_up(distance * scale())};
+    }
+    uint32_t pairs() const { return a_.count() * b_.count(); }
+    /// Indices of the triangles of a pair.
+    uint32_t in_a(uint32_t pair) const { return static_cast<uint32_t>(of_a()[pair]); }
+    uint32_t in_b(uint32_t pair) const { return static_cast<uint32_t>(of_b()[pair]); }
+    /// The triangles of the pairs from `pair` on.
+    HWY_INLINE LaneTriangle lanes_a(size_t pair) const { return pick(a_, of_a() + pair); }
+    HWY_INLINE LaneTriangle lanes_b(size_t pair) const { return pick(b_, of_b() + pair); }
 
-inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
-                                 const RelativePose& b_to_a, double distance, const LaneMarginFactors& factors) {
-    LeafResult result;
+private:
+    const int32_t* of_a() const { return kPairIndices.remainder[a_.count() - 1]; }
+    const int32_t* of_b() const { return kPairIndices.quotient[a_.count() - 1]; }
+
+    FourTriangles &a_, &b_;
+    float scale_;
+    double reach_;
+};
+
+/// Calls visit(pair, first of A, first of B) for all fours of the leaves until it returns true.
+template <class Visit>
+HWY_INLINE void any_four_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                              const RelativePose& b_to_a, Visit&& visit) {
     for (uint32_t i = 0; i < in_a.count; i += kFour) {
         FourTriangles four_a(a, in_a.first + i, std::min<uint32_t>(in_a.count - i, kFour));
         const Quad most = four_a.place();
         for (uint32_t j = 0; j < in_b.count; j += kFour) {
             FourTriangles four_b(b, in_b.first + j, std::min<uint32_t>(in_b.count - j, kFour));
-            if (test_fours(a, in_a.first + i, four_a, most, b, in_b.first + j, four_b, b_to_a, distance, factors,
-                           result))
-                return result;
+            if (visit(FourPair(four_a, most, four_b, b_to_a), in_a.first + i, in_b.first + j)) return;
         }
     }
+}
+
+inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                                 const RelativePose& b_to_a, double distance, const LaneMarginFactors& factors) {
+    LeafResult result;
+    any_four_pair(a, in_a, b, in_b, b_to_a, [&](const FourPair& fours, uint32_t first_a, uint32_t first_b) {
+        const LaneMargins margins = fours.margins(distance, factors);
+        for (uint32_t pair = 0; pair < fours.pairs(); pair += kLanes) {
+            const auto left = std::min<uint32_t>(fours.pairs() - pair, kLanes);
+            const LaneVerdicts verdicts =
+                test_all_lanes([&](size_t lane) { return fours.lanes_a(pair + lane); },
+                               [&](size_t lane) { return fours.lanes_b(pair + lane); }, margins, factors);
+            for (uint32_t open = ~verdicts.apart & ((1u << left) - 1); open != 0; open &= open - 1) {
+                const auto lane = static_cast<uint32_t>(std::countr_zero(open));
+                const uint32_t i = first_a + fours.in_a(pair + lane), j = first_b + fours.in_b(pair + lane);
+                if ((verdicts.meet >> lane & 1) == 0) {
+                    ++result.exact_tests;
+                    if (apart(query::place(a, i), query::place(b, j, b_to_a), distance)) continue;
+                }
+                result.pair_tests += lane + 1;
+                result.meet = true, result.triangle_a = i, result.triangle_b = j;
+                return true;
+            }
+            result.pair_tests += left;
+        }
+        return false;
+    });
     return result;
 }
 

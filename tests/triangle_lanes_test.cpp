@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <optional>
 
@@ -206,6 +207,108 @@ TEST(TriangleLeaves, FindTheFirstPairThatMeets) {
     EXPECT_LT(open, pairs / 200);
 }
 
+// ---- distances ----
+
+// How often the bounds are above the distance, or far below it.
+struct DistanceTally {
+    uint32_t wrong = 0, apart = 0, loose = 0;
+};
+DistanceTally distance_tally(const Family& family, uint32_t count, const LaneMarginFactors& factors = {}) {
+    Random random(36);
+    DistanceTally out;
+    for (uint32_t i = 0; i < count; ++i) {
+        const Pair p = near_contact(random, family);
+        query::TriangleRows rows[2];
+        const auto a = reference_a(p), b = reference_b(p);
+        double largest = 0;
+        for (size_t k = 0; k < 9; ++k)
+            largest = std::max({largest, std::abs(static_cast<double>(a[k / 3][k % 3] - a[0][k % 3])),
+                                std::abs(static_cast<double>(b[k / 3][k % 3] - a[0][k % 3]))});
+        for (size_t k = 0; k < 9; ++k)
+            for (size_t lane = 0; lane < query::kLanes; ++lane) {
+                rows[0].row[k][lane] = static_cast<float>((a[k / 3][k % 3] - a[0][k % 3]) / largest);
+                rows[1].row[k][lane] = static_cast<float>((b[k / 3][k % 3] - a[0][k % 3]) / largest);
+            }
+        const query::LaneMargins margins{factors.direction, query::kPlacementError, 0};
+        const auto bounds = query::bound_lanes(rows[0], rows[1], margins, query::kFarLimit);
+        const auto truth = static_cast<double>(distance(p)) / largest;
+        out.wrong += !(bounds.lower[3] <= truth);
+        out.apart += bounds.lower[3] > 0;
+        out.loose += bounds.lower[3] < 0.98 * truth - 1e-4;
+    }
+    return out;
+}
+TEST_P(LaneFamily, BoundsDistances) {
+    const uint32_t count = 20'000;
+    const DistanceTally result = distance_tally(GetParam(), count);
+    EXPECT_EQ(result.wrong, 0u);
+    EXPECT_GT(result.apart, count / 20);
+    EXPECT_LT(result.loose, count / 50);
+    EXPECT_GT(distance_tally(GetParam(), 5'000, {.direction = -1e-5f}).wrong, 10u);
+}
+
+TEST(TriangleLeaves, FindTheNearestPair) {
+    Random random(37);
+    uint32_t apart = 0, cut = 0, exact = 0, pairs = 0;
+    const uint32_t count = 1'500;
+    for (uint32_t i = 0; i < count; ++i) {
+        const uint32_t largest = i % 50 == 0 ? kMaxLeafTriangles : i % 5 == 0 ? 20 : 4;
+        const uint32_t count_a = 1 + random.below(largest), count_b = 1 + random.below(largest);
+        const Leaf a(patch(random, count_a)), b(patch(random, count_b));
+        Pose pose_b{{}, random.rotation()};
+        pose_b.translation.z = static_cast<float>(random.in(0, 3));
+        const auto b_to_a = query::relative_pose({}, pose_b);
+        double lower = HUGE_VAL, upper = HUGE_VAL;
+        for (uint32_t k = 0; k < count_a; ++k)
+            for (uint32_t j = 0; j < count_b; ++j) {
+                const auto d = query::distance(query::place(a.tree, k), query::place(b.tree, j, b_to_a));
+                lower = std::min(lower, d.lower), upper = std::min(upper, d.upper);
+            }
+        const auto result = query::distance_of_leaves(a.tree, {0, count_a}, b.tree, {0, count_b}, b_to_a);
+        ASSERT_LE(result.lower, upper) << i; // true bounds of the same distance
+        ASSERT_GE(result.nearest.upper, lower) << i;
+        ASSERT_LE(result.nearest.upper - result.lower, 1e-9) << i;
+        const auto near =
+            query::distance(query::place(a.tree, result.triangle_a), query::place(b.tree, result.triangle_b, b_to_a));
+        ASSERT_EQ(near.upper, result.nearest.upper) << i;
+        apart += lower > 0;
+        if (lower > 0) exact += result.exact_tests, pairs += result.pair_tests;
+        // A direction, right or not, changes nothing.
+        const Point d = random.direction();
+        const glm::dvec3 ways[] = {near.on_b - near.on_a, {d[0], d[1], d[2]}};
+        for (const glm::dvec3& way : ways) {
+            if (way == glm::dvec3(0)) continue;
+            const auto again = query::distance_of_leaves(a.tree, {0, count_a}, b.tree, {0, count_b}, b_to_a, {},
+                                                         way / glm::length(way));
+            ASSERT_LE(again.lower, upper) << i;
+            ASSERT_GE(again.nearest.upper, lower) << i;
+            ASSERT_LE(again.nearest.upper - again.lower, 1e-9) << i;
+        }
+        const double limit = random.in(0, 3);
+        const auto near_ones = query::distance_of_leaves(a.tree, {0, count_a}, b.tree, {0, count_b}, b_to_a, {limit});
+        ASSERT_LE(near_ones.lower, upper) << i;
+        if (limit > upper) {
+            ASSERT_LE(near_ones.nearest.upper - near_ones.lower, 1e-9) << i;
+        } else {
+            ASSERT_GE(near_ones.lower, std::min(limit, lower) - 1e-9) << i;
+            ++cut;
+        }
+    }
+    EXPECT_GT(apart, count / 2);
+    EXPECT_GT(cut, count / 10);
+    EXPECT_LT(cut, count * 9 / 10);
+    EXPECT_LT(exact, pairs / 10);
+}
+TEST(TriangleLeaves, NoDistanceFromABadPose) {
+    const Corners t{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+    const Leaf a({t}), b({t});
+    constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+    const auto d =
+        query::distance_of_leaves(a.tree, {0, 1}, b.tree, {0, 1}, query::relative_pose({}, {{9, 0, kNan}, {}}));
+    EXPECT_EQ(d.lower, 0);
+    EXPECT_EQ(d.nearest.upper, std::numeric_limits<double>::infinity());
+}
+
 // ---- the same bits from every instruction set ----
 
 std::vector<uint64_t> all_verdicts() {
@@ -227,6 +330,8 @@ std::vector<uint64_t> all_verdicts() {
             EXPECT_EQ(v.apart & v.meet, 0u);
             out.push_back(uint64_t{v.apart} << 32 | v.meet);
         }
+        const auto bounds = query::bound_lanes(t[0], t[1], margins[0], i % 2 ? query::kFarLimit : 0.2f);
+        for (const float lower : bounds.lower) out.push_back(std::bit_cast<uint32_t>(lower));
     }
     return out;
 }
