@@ -158,6 +158,8 @@ HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const
     }
     const double rounding = 0x1p-43 * (one.reach + double{kLargestCenter});
     out.near = 0;
+    const WideTag w;
+    const hn::Rebind<float, WideTag> narrow;
     for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(w)) {
         const auto load = [&](const float* from) { return hn::PromoteTo(w, hn::Load(narrow, from + i)); };
         const auto nx = load(out.x), ny = load(out.y), nz = load(out.z);

@@ -135,7 +135,7 @@ TEST(Bits, CollideAll) {
 }
 
 TEST(Bits, Distance) {
-    expect_bits(17139403808745498815u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(11073990002678004147u, [](Bits& bits, const Scenes::Pair& p) {
         const DistanceResult r = distance(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.lower, r.upper, r.point_a, r.point_b, r.normal, r.pair, r.stats);
     });
