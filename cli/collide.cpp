@@ -1,5 +1,6 @@
 // prolate collide: one query between two trees, for trying out and for scripts.
 #include "cli/common.hpp"
+#include "cli/pose.hpp"
 
 #include <prolate/collide.hpp>
 
@@ -7,9 +8,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <memory>
 
 namespace prolate::cli {
@@ -32,35 +30,11 @@ struct CollideArguments {
     bool json = false;
 };
 
-// Three or seven finite numbers with commas between them, the last four not all zero.
-std::optional<Pose> parse_pose(std::string_view text) {
-    float numbers[7] = {0, 0, 0, 0, 0, 0, 1};
-    size_t count = 0;
-    for (bool more = true; more;) {
-        if (count == std::size(numbers)) return {};
-        const size_t comma = text.find(',');
-        more = comma != text.npos;
-        std::string_view word = text.substr(0, comma);
-        if (more) text.remove_prefix(comma + 1);
-        while (word.starts_with(' ')) word.remove_prefix(1);
-        while (word.ends_with(' ')) word.remove_suffix(1);
-        if (word.starts_with('+')) word.remove_prefix(1);
-        float& number = numbers[count++];
-        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-        if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(number)) return {};
-    }
-    if (count != 3 && count != 7) return {};
-    if (std::all_of(numbers + 3, numbers + 7, [](float q) { return q == 0; })) return {};
-    return Pose{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5], numbers[6]}};
-}
-
 constexpr const char* kVerdicts[] = {"separated", "overlapping", "undecided"};
 
 int run(const CollideArguments& a) {
     const auto pose = parse_pose(a.pose);
-    if (!pose)
-        return complain(kUsage, "--pose", "not three or seven finite numbers, the quaternion not zero",
-                        "write tx,ty,tz or tx,ty,tz,qx,qy,qz,qw");
+    if (!pose) return complain_of_pose();
     int code = kDone;
     const auto tree_a = read_tree(a.tree_a, code);
     if (!tree_a) return code;

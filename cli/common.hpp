@@ -48,6 +48,7 @@ void add_verify(CLI::App& app, Work& chosen);
 void add_export(CLI::App& app, Work& chosen);
 void add_collide(CLI::App& app, Work& chosen);
 void add_render(CLI::App& app, Work& chosen);
+void add_view(CLI::App& app, Work& chosen);
 
 /// Prints the one line "prolate: <subject>: <what>; <advice>" on stderr (no "; " if `advice` is empty, control
 /// characters made visible) and returns `code`.

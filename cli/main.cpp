@@ -17,6 +17,7 @@ Examples:
   prolate bake horse.obj -o horse.etree --levels 3
   prolate verify horse.etree horse.obj
   prolate export horse.etree -o horse.csv --level 2
+  prolate view horse.etree horse.obj -o horse.html
   prolate collide horse.etree horse.etree --pose 0.5,0,0
 
 Exit codes: 0 done, 1 the answer is "no" (verify) or some assets failed (bake --manifest), 2 usage, 3 bad input,
@@ -66,6 +67,7 @@ int run(int argc, char** argv) {
     add_export(app, chosen);
     add_collide(app, chosen);
     add_render(app, chosen);
+    add_view(app, chosen);
     if (const int code = check_words(app, {argv + 1, argv + argc}); code != kDone) return code;
     try {
         app.parse(argc, argv);

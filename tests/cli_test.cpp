@@ -847,6 +847,7 @@ TEST_F(Cli, BadTreesAreRefusedByEveryCommand) {
         expect_failure(run({"verify", c.path, shared("peanut.obj")}), c.code, c.path, c.words);
         expect_failure(run({"export", c.path, "-o", file("out.csv")}), c.code, c.path, c.words);
         expect_failure(run({"collide", shared("peanut.etree"), c.path}), c.code, c.path, c.words);
+        expect_failure(run({"view", c.path, "-o", file("out.html")}), c.code, c.path, c.words);
     }
     EXPECT_EQ(listing(), before);
 }
@@ -1013,13 +1014,72 @@ TEST_F(Cli, CollideRefusesBadPoses) {
     }
 }
 
+// ---- view ---- (tests/viewer looks at pages with a browser)
+
+// The JSON of a page's scene.
+Json scene_of(const std::string& page) {
+    const std::string begin = "<script id=\"scene\" type=\"application/json\">";
+    const size_t at = page.find(begin) + begin.size();
+    return Json::parse(page.substr(at, page.find("</script>", at) - at));
+}
+
+TEST_F(Cli, ViewMakesAPageOfItsOwn) {
+    const std::string tree = file("a<b>&\"'.etree", read(shared("peanut.etree")));
+    const Outcome o = run({"view", tree, shared("peanut.obj"), "-o", file("page.html")});
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.out + o.err, "");
+    const std::string page = read(file("page.html"));
+    EXPECT_TRUE(page.starts_with("<!DOCTYPE html>"));
+    EXPECT_NE(page.find("default-src 'none'"), std::string::npos);
+    for (const char* reference : {"http:", "https:", "src=\"", "<link rel=\"stylesheet", "@import", "a<b>&"})
+        EXPECT_EQ(page.find(reference), std::string::npos) << reference;
+    EXPECT_LT(page.size(), 3'000'000u);
+    const Json scene = scene_of(page), &body = scene["bodies"][0];
+    EXPECT_EQ(body["tree"], "a<b>&\"'.etree");
+    EXPECT_EQ(body["levels"].size(), 3u);
+    EXPECT_EQ(body["nodes"]["slot"]["count"], Json::parse(run({"info", tree, "--json"}).out)["nodes"]);
+    EXPECT_EQ(body["mesh"]["triangles"]["count"], 3 * 768);
+    EXPECT_GT(body["lattice"]["distance"]["count"], 100'000);
+    EXPECT_TRUE(body["nodes"].contains("sub_volume"));
+
+    const Outcome piped = run({"view", tree, "-o", "-", "--up", "-z"});
+    ASSERT_EQ(piped.code, 0) << piped.err;
+    const Json alone = scene_of(piped.out);
+    EXPECT_EQ(alone["up"], "-z");
+    EXPECT_FALSE(alone["bodies"][0].contains("mesh") || alone["bodies"][0]["nodes"].contains("sub_volume"));
+
+    const Outcome other = run({"view", tree, file("cube.obj", obj_text(cube())), "-o", "-"});
+    EXPECT_EQ(other.code, 0);
+    EXPECT_NE(other.err.find("not the mesh"), std::string::npos) << other.err;
+}
+
+TEST_F(Cli, ViewTellsWhatItCannotDo) {
+    const std::string tree = shared("peanut.etree"), mesh = shared("peanut.obj"), out = file("page.html");
+    expect_failure(run({"view", tree, "-o", file("page.png")}), 2, file("page.png"), ".html");
+    expect_failure(run({"view", mesh, tree, "-o", out}), 2, "view", "a mesh must follow");
+    expect_failure(run({"view", tree, mesh, mesh, "-o", out}), 2, "view", "a mesh must follow");
+    expect_failure(run({"view", tree, tree, tree, "-o", out}), 2, "view", "3 trees are too many");
+    expect_failure(run({"view", tree, "--pose", "1,2,3", "-o", out}), 2, "--pose", "no second body");
+    expect_failure(run({"view", tree, tree, "--pose", "1,2", "-o", out}), 2, "--pose", "three or seven");
+    expect_failure(run({"view", tree, "--up", "w", "-o", out}), 2, "view", "--up");
+    expect_failure(run({"view", tree, "-o", file("nowhere/page.html")}), 4, file("nowhere/page.html"),
+                   "does not exist");
+    EXPECT_TRUE(listing().empty());
+    // Two trees need the runtime in the page; without emscripten, the command says so.
+    const Outcome two = run({"view", tree, mesh, tree, "--pose", "1,2,3", "-o", out});
+    if (two.code != 0) return expect_failure(two, 2, "view", "built without emscripten");
+    const Json scene = scene_of(read(out));
+    EXPECT_EQ(scene["pose"], (Json{1, 2, 3, 0, 0, 0, 1}));
+    EXPECT_EQ(scene["bodies"][1]["file"]["count"], fs::file_size(tree));
+}
+
 // ---- help ----
 
 TEST_F(Cli, HelpTeachesWithExamples) {
     const Outcome help = run({"--help"});
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Exit codes"), std::string::npos);
-    for (const char* command : {"bake", "info", "verify", "export", "collide", "render"}) {
+    for (const char* command : {"bake", "info", "verify", "export", "collide", "render", "view"}) {
         EXPECT_NE(help.out.find(command), std::string::npos);
         const Outcome one = run({command, "--help"});
         EXPECT_EQ(one.code, 0);

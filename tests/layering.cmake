@@ -10,7 +10,7 @@ cmake_minimum_required(VERSION 3.25)
 
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
-set(layers include/prolate src query builder cli)
+set(layers include/prolate src query builder viewer cli)
 set(core_headers "types|error|tree|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
@@ -29,6 +29,10 @@ set(query_libraries "glm/.*|hwy/.*")
 set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
+
+set(viewer_headers "${core_headers}|query|collide|distance")
+set(viewer_folders "viewer")
+set(viewer_libraries "none")
 
 set(cli_headers ".*")
 set(cli_folders "src|builder|query|cli")
@@ -49,7 +53,7 @@ function(allowed out file layer form target)
   elseif(target MATCHES "^prolate/(.*)\\.hpp$")
     set(pattern "${${layer}_headers}")
     set(subject "${CMAKE_MATCH_1}")
-  elseif(target MATCHES "^(src|query|builder|cli|tests|bench|examples)/")
+  elseif(target MATCHES "^(src|query|builder|viewer|cli|tests|bench|examples)/")
     set(pattern "${${layer}_folders}")
     set(subject "${CMAKE_MATCH_1}")
   elseif(form STREQUAL "<" AND target MATCHES "^[a-z_0-9]+$")

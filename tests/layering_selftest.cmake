@@ -5,7 +5,7 @@
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")
-foreach(folder include src query builder cli)
+foreach(folder include src query builder viewer cli)
   file(COPY "${ROOT}/${folder}" DESTINATION "${WORK}")
 endforeach()
 
@@ -54,6 +54,8 @@ plant(bad query/planted.cpp "#include <prolate/eigen.hpp>")
 plant(bad query/planted.cpp "  #  include <assimp/scene.h>")
 plant(bad query/planted.cpp "#include <tbb/parallel_for.h>")
 plant(bad query/planted.cpp "#include \"cli/common.hpp\"")
+plant(bad viewer/planted.cpp "#include \"query/lanes.hpp\"")
+plant(good viewer/planted.cpp "#include <prolate/distance.hpp>")
 plant(bad query/planted.cpp "#include \"src/../builder/winding.hpp\"")
 plant(good query/planted.cpp "#include <glm/vec3.hpp>")
 plant(good query/planted.cpp "#include <prolate/query.hpp>")

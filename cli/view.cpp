@@ -1,0 +1,150 @@
+// prolate view: trees to look at, and to move against each other, as one page for a browser.
+#include "cli/common.hpp"
+#include "cli/pose.hpp"
+#include "cli/render_panel.hpp"
+#include "cli/view_scene.hpp"
+
+#include <prolate/version.hpp>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+
+namespace prolate::cli {
+namespace {
+
+constexpr const char* kFooter = R"(
+One or two trees, each followed by the mesh that it was baked from, if you have it. The mesh is shown with the tree, and
+tells how far ellipsoids stick out; an exact tree brings its own. The page is one file that needs no network and no
+server, and sends nothing anywhere. It needs a browser with WebGL 2, as all have had since 2021. Press ? in it for help.
+
+With two trees, one body can be dragged against the other. Verdict, distance, nearest points and counts come from
+prolate's own runtime, compiled to WebAssembly; it is part of a command that was built where emscripten was installed.
+
+Examples:
+  prolate view horse.etree horse.obj -o horse.html
+  prolate view horse.etree horse.obj bunny.etree bunny.obj -o both.html
+  prolate view horse.etree bunny.etree --pose 0.5,0,0 -o - >both.html)";
+
+struct ViewArguments {
+    std::vector<std::string> files;
+    std::string output, up = "y", pose;
+};
+
+bool is_tree(const std::string& path) {
+    if (extension(path) == "etree") return true;
+    char magic[6] = {};
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+    return file && std::fread(magic, 1, sizeof magic, file.get()) == sizeof magic &&
+           std::string_view(magic, sizeof magic) == "\x89"
+                                                    "ETREE";
+}
+
+std::string name_of(const std::string& path) {
+    return std::filesystem::path(path).filename().string();
+}
+
+// A tree as it was named on the command line, and what was read.
+struct Asset {
+    std::string tree_path, mesh_path;
+    std::optional<Tree> tree;
+    std::optional<CleanMesh> mesh;
+    bool own_mesh = true;
+};
+
+// Which mesh belongs to which tree; nothing if that is not clear.
+std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& files) {
+    std::vector<Asset> assets;
+    for (const std::string& path : files) {
+        if (is_tree(path))
+            assets.push_back({path, "", {}, {}, true});
+        else if (!assets.empty() && assets.back().mesh_path.empty())
+            assets.back().mesh_path = path;
+        else
+            return {};
+    }
+    return assets;
+}
+
+int read_asset(Asset& asset) {
+    int code = kDone;
+    asset.tree = read_tree(asset.tree_path, code);
+    if (!asset.tree) return code;
+    if (asset.mesh_path.empty()) {
+        if (asset.tree->view().has_triangles()) asset.mesh = mesh_of(asset.tree->view());
+        return kDone;
+    }
+    const auto raw = read_mesh(asset.mesh_path, code);
+    if (!raw) return code;
+    auto cleaned = clean(raw->view());
+    if (!cleaned) return complain(asset.mesh_path, cleaned.error());
+    asset.own_mesh = hash(cleaned->mesh.view()) == asset.tree->view().bake_info().source_hash;
+    if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
+    asset.mesh = std::move(*cleaned);
+    return kDone;
+}
+
+int run(const ViewArguments& a) {
+    if (const std::string kind = extension(a.output); !kind.empty() && kind != "html" && kind != "htm")
+        return complain(kUsage, a.output, "view writes HTML files only", "end the name in .html");
+    auto assets = sort_files(a.files);
+    if (!assets)
+        return complain(kUsage, "view", "a mesh must follow the tree that it belongs to",
+                        "name one or two .etree files, each with at most one mesh after it");
+    if (assets->size() > 2)
+        return complain(kUsage, "view", fmt::format("{} trees are too many", assets->size()), "name one or two");
+    const bool two = assets->size() == 2;
+    std::optional<Pose> pose;
+    if (!a.pose.empty()) {
+        if (!two) return complain(kUsage, "--pose", "there is no second body to place", "name two trees");
+        pose = parse_pose(a.pose);
+        if (!pose) return complain_of_pose();
+    }
+    if (two && !has_query_module())
+        return complain(kUsage, "view", "this prolate was built without emscripten, so its pages cannot answer queries",
+                        "view one tree, or install emscripten and build prolate again");
+    if (const int code = check_output(a.output); code != kDone) return code;
+
+    nlohmann::ordered_json scene{
+        {"version", fmt::format("{}.{}.{}", PROLATE_VERSION_MAJOR, PROLATE_VERSION_MINOR, PROLATE_VERSION_PATCH)},
+        {"up", a.up}};
+    if (pose) {
+        const auto& [t, r] = *pose;
+        scene["pose"] = {t.x, t.y, t.z, r.x, r.y, r.z, r.w};
+    }
+    scene["bodies"] = nlohmann::ordered_json::array();
+    NumberBlock numbers;
+    for (Asset& asset : *assets) {
+        if (const int code = read_asset(asset); code != kDone) return code;
+        ProgressLine line;
+        auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
+                               std::move(asset.mesh), asset.own_mesh},
+                              numbers, two, [&line](double fraction) { return line.show("measuring", fraction); });
+        if (!body) return complain("view", Error{ErrorCode::cancelled});
+        scene["bodies"].push_back(std::move(*body));
+    }
+    return write_output(a.output, view_page(scene, numbers, two));
+}
+
+} // namespace
+
+void add_view(CLI::App& app, Work& chosen) {
+    auto a = std::make_shared<ViewArguments>();
+    CLI::App* command = app.add_subcommand("view", "Make a page to look at trees, and to collide two, in a browser");
+    command->add_option("files", a->files, "one or two .etree files, each with its mesh after it")
+        ->required()
+        ->type_name("TREE [MESH] [TREE [MESH]]");
+    command->add_option("-o,--output", a->output, "the HTML file to write, or - for standard output")->required();
+    command->add_option("--pose", a->pose, "of the second body in the frame of the first: tx,ty,tz[,qx,qy,qz,qw]");
+    command->add_option("--up", a->up, "the models' axis that points up")
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
+        ->capture_default_str();
+    command->footer(kFooter);
+    command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
+}
+
+} // namespace prolate::cli

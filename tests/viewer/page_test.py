@@ -1,0 +1,104 @@
+"""What the tests of pages share: meshes, the command, a window, and looks at it."""
+import math
+import os
+import subprocess
+import sys
+import unittest
+
+from browser import Browser, missing
+from picture import Picture
+
+PROLATE, FOLDER = sys.argv[1:3]
+SKIPPED = 77
+
+
+def boxes(count, pitch=3.0):
+    """An OBJ of so many boxes in two rows, well apart."""
+    lines = []
+    for box in range(count):
+        x, y = pitch * (box // 2), pitch * (box % 2)
+        for corner in range(8):
+            lines.append(f"v {x + (corner & 1) * 1.2} {y + (corner >> 1 & 1) * 0.9} {(corner >> 2) * 0.6}")
+        for quad in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)):
+            lines.append("f " + " ".join(str(8 * box + corner + 1) for corner in quad))
+    return "\n".join(lines) + "\n"
+
+
+def bumpy(around=48, down=24, size=1):
+    """An OBJ of a closed ball with bumps: a mesh that ellipsoids of any number can still approximate better."""
+    lines, index = [f"v 0 0 {1.2 * size}", f"v 0 0 {-1.2 * size}"], lambda i, j: 3 + (i % around) + around * (j - 1)
+    for j in range(1, down):
+        for i in range(around):
+            a, b = 2 * math.pi * i / around, math.pi * j / down
+            r = size * (1.2 + 0.3 * math.sin(b) * math.sin(4 * a) * math.sin(5 * b))
+            lines.append(f"v {r * math.sin(b) * math.cos(a)} {r * math.sin(b) * math.sin(a)} {r * math.cos(b)}")
+    for i in range(around):
+        lines += [f"f 1 {index(i, 1)} {index(i + 1, 1)}", f"f 2 {index(i + 1, down - 1)} {index(i, down - 1)}"]
+        for j in range(1, down - 1):
+            lines.append(f"f {index(i, j)} {index(i, j + 1)} {index(i + 1, j + 1)} {index(i + 1, j)}")
+    return "\n".join(lines) + "\n"
+
+
+def run(*arguments):
+    subprocess.run([PROLATE, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def path(name):
+    return os.path.join(FOLDER, name)
+
+
+def bake(name, mesh, *options):
+    """A mesh and its tree."""
+    with open(path(name + ".obj"), "w", encoding="utf-8") as file:
+        file.write(mesh)
+    run("bake", path(name + ".obj"), "-o", path(name + ".etree"), "--quality", "fast", *options)
+
+
+class PageTest(unittest.TestCase):
+    """Opens a page afresh for each test, and sees to it that the console stays clean."""
+    page = None
+    browser = None  # one window for all
+
+    def setUp(self):
+        self.browser.open(path(self.page))
+        self.browser.wait_for("window.viewer")
+
+    def tearDown(self):
+        self.browser.release()
+        self.settle()
+        if "--screenshots" in sys.argv:
+            with open(path(self.id() + ".png"), "wb") as file:
+                file.write(self.browser.screenshot())
+        self.assertEqual([entry for entry in self.browser.console() if entry[0] == "SEVERE"], [])
+
+    def js(self, text, *arguments):
+        return self.browser.script("return " + text, *arguments)
+
+    def settle(self):
+        """Waits for the picture at rest."""
+        self.browser.wait_for("viewer.atRest")
+
+    def canvas(self):
+        """Its width and height: it begins at the window's corner."""
+        return self.js("[viewer.renderer.canvas.clientWidth, viewer.renderer.canvas.clientHeight]")
+
+    def shot(self):
+        self.settle()
+        return Picture(self.browser.screenshot())
+
+    def blobs(self):
+        return self.shot().blobs(self.canvas()[0])
+
+    def set_slider(self, name, value):
+        self.browser.script("const slider = document.getElementById(arguments[0]); slider.value = arguments[1];"
+                            "slider.dispatchEvent(new Event('input'))", name, value)
+
+
+def main():
+    """Runs the tests of the calling file; exits with SKIPPED if no browser is installed."""
+    if reason := missing():
+        print(f"skipped: {reason}")
+        sys.exit(SKIPPED)
+    os.makedirs(FOLDER, exist_ok=True)
+    with Browser(1000, 700) as PageTest.browser:
+        unittest.main(argv=[sys.argv[0]] + [a for a in sys.argv[3:] if a != "--screenshots"], verbosity=2)

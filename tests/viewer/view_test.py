@@ -1,0 +1,175 @@
+"""The page of `prolate view` for one tree, in headless Chromium: what it shows, and what it does.
+
+    view_test.py PROLATE FOLDER [--screenshots] [TEST...]      exits with 77 if no browser is installed
+"""
+import os
+import re
+
+from page_test import PageTest, bake, boxes, bumpy, main, path, run
+
+
+class OneTree(PageTest):
+    page = "one.html"
+
+    @classmethod
+    def setUpClass(cls):
+        bake("boxes", boxes(8), "--degree", "8", "--levels", "2")
+        run("view", path("boxes.etree"), path("boxes.obj"), "-o", path(cls.page))
+
+    def test_shows_as_many_ellipsoids_as_the_level_has(self):
+        self.set_slider("level", 1)
+        self.assertEqual(self.blobs(), 8)
+        self.assertEqual(self.js("viewer.renderer.drawn"), 8)
+        self.assertEqual(self.js("viewer.renderer.visibleNodes()"), 8)
+        self.assertIn("8 ellipsoids", self.js("document.getElementById('level-text').textContent"))
+        self.set_slider("level", 0)
+        self.assertEqual(self.blobs(), 1)
+        self.set_slider("level", 2)
+        self.settle()
+        self.assertEqual(self.js("viewer.renderer.drawn"), 64)
+        self.assertGreater(self.js("viewer.renderer.visibleNodes()"), 24)
+
+    def test_opacity_and_wires(self):
+        self.set_slider("level", 1)
+        full = len(self.shot().inked(self.canvas()[0]))
+        self.set_slider("cover-opacity", 0)
+        mesh = self.shot()
+        self.assertEqual(mesh.blobs(self.canvas()[0]), 8, "the mesh is inside, in eight parts")
+        only_mesh = len(mesh.inked(self.canvas()[0]))
+        self.assertLess(only_mesh, 0.9 * full)
+        self.browser.keys("e")
+        self.assertLess(len(self.shot().inked(self.canvas()[0])), 0.5 * only_mesh, "wires have gaps")
+        self.set_slider("mesh-opacity", 0)
+        self.assertEqual(self.blobs(), 0)
+        self.set_slider("cover-opacity", 1)
+        self.browser.keys("w")
+        self.assertLess(len(self.shot().inked(self.canvas()[0])), 0.5 * full)
+
+    def test_colour_by_outside_distance(self):
+        self.set_slider("level", 1)
+        before = self.shot()
+        self.browser.keys("c")
+        self.assertEqual(self.js("viewer.state.colour"), "outside")
+        self.assertFalse(self.js("document.getElementById('legend').hidden"))
+        after, width = self.shot(), self.canvas()[0]
+        inked = before.inked(width)
+        changed = sum(before.pixel(*at) != after.pixel(*at) for at in inked)
+        self.assertGreater(changed, 0.5 * len(inked))
+
+    def test_section_cuts_away(self):
+        self.set_slider("level", 1)
+        self.browser.keys("x")
+        self.assertEqual(self.blobs(), 4, "the half in front of the cut is gone")
+        self.browser.keys("f")
+        self.assertEqual(self.blobs(), 4)
+        self.set_slider("section-at", 0.999)
+        self.assertEqual(self.blobs(), 0)
+        self.browser.keys("s")
+        self.assertEqual(self.blobs(), 8)
+
+    def test_hover_describes_the_node(self):
+        self.set_slider("level", 1)
+        self.settle()
+        x, y = min(self.shot().inked(self.canvas()[0]))  # at the left border of the picture's ink
+        self.browser.hover(x + 8, y)
+        self.browser.wait_for("!document.getElementById('tip').hidden")
+        text = self.js("document.getElementById('tip').textContent")
+        for word in ("Node", "level1", "radii", "outside volume", "sub-volume"):
+            self.assertIn(word, text)
+        # A box's share is an eighth of the solid, and its ellipsoid holds more than the box.
+        self.assertRegex(text, r"1[23]\.?\d* % of all")
+        self.browser.hover(3, 3)
+        self.browser.wait_for("document.getElementById('tip').hidden")
+
+    def test_mouse_and_touch_move_the_camera(self):
+        width, height = self.canvas()
+        view = "[viewer.camera.azimuth, viewer.camera.elevation, viewer.camera.distance, ...viewer.camera.target]"
+        start = self.js(view)
+        self.browser.drag((width / 2, height / 2), (width / 2 + 80, height / 2 + 20))
+        turned = self.js(view)
+        self.assertLess(turned[0], start[0] - 20)
+        self.assertGreater(turned[1], start[1])
+        self.assertEqual(turned[2:], start[2:])
+        self.browser.drag((width / 2, height / 2), (width / 2 - 50, height / 2), touch=True)
+        self.assertGreater(self.js(view)[0], turned[0] + 10)
+        self.browser.drag((width / 2, height / 2), (width / 2 + 60, height / 2), button=2)
+        self.assertNotEqual(self.js(view)[3:], start[3:])
+        self.browser.wheel(width / 2, height / 2, -300)
+        self.browser.wait_for(f"viewer.camera.distance < {0.8 * start[2]}")
+        self.browser.keys("r")
+        self.assertEqual(self.js(view), start)
+
+    def test_keys_and_their_sheet(self):
+        self.browser.keys("1")
+        self.assertEqual(self.js("viewer.state.level"), 1)
+        self.browser.keys("]")
+        self.assertEqual(self.js("viewer.state.level"), 2)
+        self.browser.keys("?")
+        self.assertTrue(self.js("document.getElementById('help').open"))
+        self.assertIn("coarser, finer", self.js("document.getElementById('help').textContent"))
+        self.browser.keys("0")
+        self.assertEqual(self.js("viewer.state.level"), 2, "the sheet is in front")
+        self.browser.keys("?")
+        self.assertFalse(self.js("document.getElementById('help').open"))
+
+    def test_refuses_to_load_anything(self):
+        self.assertEqual(self.js("performance.getEntriesByType('resource').length"), 0)
+        blocked = self.js("fetch('https://example.org/').then(() => 'sent', () => 'blocked')")
+        self.assertEqual(blocked, "blocked")
+        self.assertIn("Content Security Policy", str(self.browser.console()))
+
+
+class TreeAlone(PageTest):
+    page = "alone.html"
+    name = "a</script><b>&\"'é.etree"
+
+    @classmethod
+    def setUpClass(cls):
+        bake("two", boxes(2), "--degree", "2", "--levels", "1")
+        os.replace(path("two.etree"), path(cls.name.replace("/", "")))
+        run("view", path(cls.name.replace("/", "")), "-o", path(cls.page))
+
+    def test_without_mesh_and_with_an_odd_name(self):
+        self.assertEqual(self.js("document.getElementById('title').textContent"), self.name.replace("/", ""))
+        self.assertEqual(self.blobs(), 2)
+        self.assertTrue(self.js("document.querySelector('[data-value=outside]').disabled"))
+        self.assertTrue(self.js("document.getElementById('mesh-row').hidden"))
+
+
+class ExactTree(PageTest):
+    page = "exact.html"
+
+    @classmethod
+    def setUpClass(cls):
+        bake("exact", boxes(4), "--exact")
+        run("view", path("exact.etree"), "-o", path(cls.page))
+
+    def test_brings_its_own_mesh(self):
+        self.set_slider("cover-opacity", 0)
+        self.assertEqual(self.blobs(), 4)
+        self.assertFalse(self.js("document.querySelector('[data-value=outside]').disabled"))
+
+
+class Figures(PageTest):
+    """No assertion on times: they are printed."""
+    page = "figures.html"
+
+    @classmethod
+    def setUpClass(cls):
+        bake("many", bumpy(), "--degree", "8", "--levels", "3")
+        run("view", path("many.etree"), path("many.obj"), "-o", path(cls.page))
+
+    def test_first_frame_and_size(self):
+        first = self.js("performance.getEntriesByName('first-frame')[0].startTime")
+        nodes = self.js("viewer.scene.bodies[0].nodeCount")
+        print(f"first frame of a tree of {nodes} nodes after {first:.0f} ms")
+        with open(path(self.page), encoding="utf-8") as file:
+            page = file.read()
+        numbers = re.search(r'<script id="numbers"[^>]*>\n(.*?)</script>', page)[1]
+        print(f"page {len(page)} bytes, of these {len(numbers)} data")
+        self.assertGreater(nodes, 400)
+        self.assertLess(len(page) - len(numbers), 3_000_000)
+
+
+if __name__ == "__main__":
+    main()

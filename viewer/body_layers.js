@@ -1,0 +1,94 @@
+// A body's buffers: the ellipsoids of the cut that is shown, the mesh, and the distances around the solid.
+import {kBodyColours, kContact, kMesh, kMeshInside} from './colours.js';
+import {bindTexture, vertexArray} from './gl.js';
+
+const kRowBits = 28; // of an id: the node's row + 1; above it the body
+
+export const idOf = (body, row) => (body << kRowBits | (row + 1)) >>> 0;
+export const nodeOf = (id) => (id === 0 ? null : {body: id >>> kRowBits, row: (id & ((1 << kRowBits) - 1)) - 1});
+
+export class BodyLayers {
+  constructor(gl, body, index) { Object.assign(this, {gl, body, index, level: -1}); }
+
+  /// Shows the cut at `level`; `marked` holds rows of nodes to be marked.
+  show(level, marked) {
+    if (level === this.level && marked === this.marked) return;
+    const rows = this.body.cut(level), {ellipsoid, colour} = this.body.nodes;
+    if (level !== this.level) {
+      const shapes = new Float32Array(9 * rows.length), colours = new Uint8Array(3 * rows.length);
+      rows.forEach((row, i) => {
+        shapes.set(ellipsoid.subarray(9 * row, 9 * row + 9), 9 * i);
+        colours.set(colour.subarray(3 * row, 3 * row + 3), 3 * i);
+      });
+      this.coverArray?.free();
+      this.coverArray = vertexArray(this.gl, {
+        0: {data: shapes, size: 9, divisor: 1}, // takes up locations 0 to 2
+        3: {data: colours, size: 3, divisor: 1, normalised: true},
+        4: {data: Uint32Array.from(rows, (row) => idOf(this.index, row)), size: 1, divisor: 1, integer: true},
+        5: {data: new Uint8Array(rows.length), size: 1, divisor: 1},
+      });
+      Object.assign(this, {level, count: rows.length, marked: undefined});
+    }
+    if (marked !== this.marked) {
+      this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.coverArray.buffers[5]);
+      this.gl.bufferSubData(this.gl.ARRAY_BUFFER, 0, Uint8Array.from(rows, (row) => (marked?.has(row) ? 1 : 0)));
+      this.marked = marked;
+    }
+  }
+
+  drawCover(program, view, look) {
+    const {gl, body} = this, {lattice} = body;
+    // Made when first needed: the first picture comes sooner.
+    const distances = lattice && (look.colouring === 'outside' || look.section);
+    if (distances) {
+      this.distances ??= distanceTexture(gl, lattice);
+      bindTexture(gl, 0, this.distances, gl.TEXTURE_3D);
+    }
+    program.use({
+      ...view,
+      u_wire: look.wire,
+      u_line: 0.6 * look.line,
+      u_colouring: look.colouring === 'outside' && !lattice ? 2 : {branch: 0, outside: 1, body: 2}[look.colouring],
+      u_body_colour: look.colouring === 'body' ? kBodyColours[this.index] : kMesh,
+      u_mark_colour: kContact,
+      u_solid_colour: kMesh,
+      u_has_distance: Boolean(distances),
+      u_distance: 0,
+      u_distance_origin: lattice ? lattice.origin.map((x) => x - lattice.pitch / 2) : [0, 0, 0],
+      u_distance_step: lattice ? lattice.size.map((n) => 1 / (n * lattice.pitch)) : [0, 0, 0],
+      u_ramp: 1,
+      u_ramp_end: look.rampEnd,
+    });
+    gl.bindVertexArray(this.coverArray.array);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
+  }
+
+  drawMesh(program, view, look) {
+    if (!this.body.mesh) return;
+    this.meshArray ??= vertexArray(this.gl, {0: {data: cornersOf(this.body.mesh), size: 3}});
+    program.use({...view, u_wire: look.wire, u_line: 0.8 * look.line, u_colour: kMesh, u_inside_colour: kMeshInside});
+    this.gl.bindVertexArray(this.meshArray.array);
+    this.gl.drawArrays(this.gl.TRIANGLES, 0, this.body.mesh.triangles.length);
+  }
+}
+
+function cornersOf({vertices, triangles}) {
+  const out = new Float32Array(3 * triangles.length);
+  for (let i = 0; i < triangles.length; ++i)
+    for (let k = 0; k < 3; ++k) out[3 * i + k] = vertices[3 * triangles[i] + k];
+  return out;
+}
+
+function distanceTexture(gl, {size, distance}) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_3D, texture);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 2);
+  gl.texImage3D(gl.TEXTURE_3D, 0, gl.R16F, ...size, 0, gl.RED, gl.HALF_FLOAT, distance);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
+  for (const [name, value] of [
+           [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
+           [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
+           [gl.TEXTURE_WRAP_R, gl.CLAMP_TO_EDGE]])
+    gl.texParameteri(gl.TEXTURE_3D, name, value);
+  return texture;
+}

@@ -1,0 +1,106 @@
+// The controls beside the picture, and the figures of what is shown.
+import {ramp} from './colours.js';
+import {element, fillFigures} from './dom.js';
+import {grouped, percent, plural, short} from './format.js';
+
+export class Panel {
+  constructor(app) {
+    this.app = app;
+    const {scene, state} = app;
+    this.names();
+    this.range('level', 'level', (x) => x);
+    element('level').max = app.levelCount - 1;
+    for (let l = 0; l < app.levelCount; ++l) element('level-marks').append(new Option('', l));
+    this.range('cover-opacity', 'coverOpacity', (x) => x);
+    this.range('mesh-opacity', 'meshOpacity', (x) => x);
+    this.range('section-at', 'sectionAt', (x) => x, {section: true});
+    this.check('cover-wire', 'coverWire');
+    this.check('mesh-wire', 'meshWire');
+    this.check('section-on', 'section');
+    element('section-flip')
+        .addEventListener('click', () => state.set({section: true, sectionFlip: !state.sectionFlip}));
+    element('reset-view').addEventListener('click', () => app.resetView());
+    element('help-open').addEventListener('click', () => app.toggleHelp());
+    for (const group of document.querySelectorAll('[data-state]')) this.choice(group);
+
+    const hasMesh = scene.bodies.some((body) => body.mesh), hasDistances = scene.bodies.some((body) => body.lattice);
+    element('mesh-row').hidden = !hasMesh;
+    this.button('colour', 'body').hidden = scene.bodies.length < 2;
+    this.button('colour', 'outside').disabled = !hasDistances;
+    if (!hasDistances)
+      element('colour-note').textContent = 'Name the mesh after the tree to see how far ellipsoids stick out.';
+    const legend = element('legend-ramp').getContext('2d'), pixels = legend.createImageData(256, 1);
+    pixels.data.set(ramp(256));
+    legend.putImageData(pixels, 0, 0);
+    state.onChange(() => this.refresh());
+    this.refresh();
+  }
+
+  names() {
+    const {bodies} = this.app.scene;
+    const plain = (body) => body.tree + (body.mesh_name ? ` with ${body.mesh_name}` : '');
+    const title = bodies.map((body) => body.tree).join(' and ');
+    document.title = `${title} – prolate`;
+    element('title').textContent = title;
+    const kind = (body) => (body.exact ? 'exact tree' : `ellipsoid tree${body.proved ? ', cover proved' : ''}`) +
+        (body.surface ? ', open mesh' : '');
+    element('subtitle').textContent = bodies.length > 1 ?
+        bodies.map((body, i) => `${'AB'[i]}: ${plain(body)}`).join('; ') :
+        kind(bodies[0]) + (bodies[0].mesh ? ` · ${grouped(bodies[0].mesh.triangles.length / 3)} triangles` : '');
+  }
+
+  range(id, name, read, also = {}) {
+    const input = element(id);
+    input.addEventListener('input', () => this.app.state.set({...also, [name]: read(input.valueAsNumber)}));
+  }
+  check(id, name) {
+    const input = element(id);
+    input.addEventListener('change', () => this.app.state.set({[name]: input.checked}));
+  }
+  choice(group) {
+    const name = group.dataset.state;
+    for (const button of group.children)
+      button.addEventListener('click', () => {
+        const value = typeof this.app.state[name] === 'number' ? Number(button.dataset.value) : button.dataset.value;
+        this.app.state.set({[name]: value, ...(name === 'sectionAxis' ? {section: true} : {})});
+      });
+  }
+  button(group, value) { return document.querySelector(`[data-state=${group}] [data-value=${value}]`); }
+
+  refresh() {
+    const {state, scene} = this.app;
+    const values = {
+      'level': state.level,
+      'cover-opacity': state.coverOpacity,
+      'mesh-opacity': state.meshOpacity,
+      'section-at': state.sectionAt
+    };
+    for (const [id, value] of Object.entries(values)) element(id).value = value;
+    for (const [id, value] of [
+             ['cover-wire', state.coverWire], ['mesh-wire', state.meshWire], ['section-on', state.section]])
+      element(id).checked = value;
+    for (const group of document.querySelectorAll('[data-state]'))
+      for (const button of group.children)
+        button.setAttribute('aria-checked', String(state[group.dataset.state]) === button.dataset.value);
+
+    const levels = scene.bodies.map((body) => body.levels[Math.min(state.level, body.levels.length - 1)]);
+    const count = levels.map((level) => grouped(level.cut)).join(' + ');
+    const text = document.createElement('b');
+    text.textContent = state.level;
+    const words = levels.length > 1 ? count : plural(levels[0].cut, 'ellipsoid');
+    element('level-text').replaceChildren(text, ` of ${this.app.levelCount - 1} · ${words}`);
+    if (scene.bodies.length === 1) {
+      const {outside_ratio: ratio, percent_of_diagonal: far} = levels[0];
+      fillFigures(element('level-figures'), [
+        ['outside volume', ratio === null ? undefined : `${percent(ratio)} of the solid`],
+        ['farthest out', far.hausdorff_max === null ? undefined : `${short(far.hausdorff_max, 3)} % of diagonal`],
+        ['on average', far.hausdorff_mean === null ? undefined : `${short(far.hausdorff_mean, 3)} % of diagonal`],
+      ]);
+    }
+    element('legend').hidden = state.colour !== 'outside';
+    const end = this.app.rampEnd();
+    [...element('legend-ticks').children].forEach((tick, i) => {
+      tick.textContent = (i === 2 ? '≥ ' : '') + short(end * i / 2, 2);
+    });
+  }
+}
