@@ -12,8 +12,6 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kAxes[] = {"x", "y", "z", "-x", "-y", "-z"}; // in the order of UpAxis
-
 struct RenderArguments {
     std::string tree, mesh, output;
     std::string size = "1600x1200";
@@ -58,7 +56,7 @@ int run(const RenderArguments& a) {
     if (options.levels.empty())
         for (uint32_t level = std::min(1u, view.level_count() - 1); level < std::min(4u, view.level_count()); ++level)
             options.levels.push_back(level);
-    const auto axis = std::find(std::begin(kAxes), std::end(kAxes), a.up) - std::begin(kAxes);
+    const auto axis = std::find(std::begin(kUpAxes), std::end(kUpAxes), a.up) - std::begin(kUpAxes);
     options.view = {a.view[0], a.view[1], static_cast<UpAxis>(axis)};
     options.samples = a.samples;
     options.threads = a.threads;
@@ -90,7 +88,7 @@ void add_render(CLI::App& app, Work& chosen) {
         ->delimiter(',')
         ->expected(2);
     command->add_option("--up", a->up, "the model's axis that points up")
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kAxes), std::end(kAxes))))
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
         ->capture_default_str();
     command->add_option("--samples", a->samples, "light samples a pixel, 16 ... 1024")->capture_default_str();
     command->add_option("--threads", a->threads, "0 = all cores")->capture_default_str();

@@ -11,6 +11,8 @@ namespace prolate::cli {
 
 /// The axis that points up in the picture.
 enum class UpAxis : uint8_t { x, y, z, minus_x, minus_y, minus_z };
+/// What the command line calls them, in the same order.
+inline constexpr const char* kUpAxes[] = {"x", "y", "z", "-x", "-y", "-z"};
 
 /// Where the viewer stands, in degrees. Azimuth 0 looks at the front (for y up, along -z; for z up, along +y) and
 /// grows as the viewer walks to the right; elevation is the height above the horizon, -89 ... 89.
