@@ -425,13 +425,6 @@ TEST_F(Cli, WrongUsageIsOneLineWithAHint) {
     EXPECT_TRUE(listing().empty());
 }
 
-TEST_F(Cli, WhatThisVersionLacksIsRefusedByName) {
-    for (const char* format : {"glb", "pov", "obj"})
-        expect_failure(run({"export", shared("peanut.etree"), "-o", file(std::string("out.") + format)}), 2, format,
-                       "does not export");
-    EXPECT_TRUE(listing().empty());
-}
-
 // ---- writing ----
 
 TEST_F(Cli, AMissingFolderIsFoundBeforeTheWork) {
@@ -952,7 +945,7 @@ TEST_F(Cli, CsvAgreesWithInfoAndCovers) {
                    "no level 3");
 }
 
-TEST_F(Cli, ExportsJsonAndPly) {
+TEST_F(Cli, ExportsJsonAndPictures) {
     const Json info = Json::parse(run({"info", shared("peanut.etree"), "--json"}).out);
     ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("a.json")}).code, 0);
     const Json json = Json::parse(read(file("a.json")));
@@ -979,6 +972,29 @@ TEST_F(Cli, ExportsJsonAndPly) {
     const std::string bytes = read(file("a.PLY"));
     EXPECT_NE(bytes.find("property uchar red"), std::string::npos);
 
+    // Every format through the command, into a file and into a pipe, with what a level has.
+    const size_t cut = info["levels"][1]["cut"];
+    for (const auto& [format, mark] : {std::pair{"obj", "\no node_"}, {"glb", "\"mesh\":"}, {"pov", "  sphere {"}}) {
+        SCOPED_TRACE(format);
+        const std::string path = file(std::string("a.") + format);
+        ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", path, "--level", "1"}).code, 0);
+        const std::string content = read(path);
+        size_t count = 0;
+        for (size_t at = content.find(mark); at != std::string::npos; at = content.find(mark, at + 1)) ++count;
+        EXPECT_EQ(count, cut);
+        const Outcome piped = run({"export", shared("peanut.etree"), "-o", "-", "--format", format, "--level", "1"});
+        EXPECT_EQ(piped.out, content);
+        EXPECT_EQ(piped.err, "");
+    }
+    ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("fine.ply"), "--level", "1", "--segments", "64"}).code,
+              0);
+    const auto fine = load_mesh(file("fine.ply").c_str());
+    ASSERT_TRUE(fine);
+    EXPECT_EQ(fine->triangles.size(), 4 * mesh->triangles.size());
+    EXPECT_NE(read(file("a.pov")),
+              run({"export", shared("peanut.etree"), "-o", "-", "--format", "pov", "--level", "1", "--up", "-z"}).out);
+    expect_failure(run({"export", shared("peanut.etree"), "-o", file("b.obj"), "--segments", "2"}), 2, "export",
+                   "--segments");
     expect_failure(run({"export", shared("peanut.etree"), "-o", file("noname")}), 2, file("noname"), "--format");
     expect_failure(run({"export", shared("peanut.etree"), "-o", "-"}), 2, "-", "--format");
     expect_failure(run({"export", shared("peanut.etree"), "-o", file("a.doc")}), 2, "doc", "no such export format");

@@ -1,0 +1,66 @@
+// ply and obj: each ellipsoid as a mesh of its own.
+#include "cli/export_formats.hpp"
+#include "cli/export_sphere.hpp"
+#include "cli/little_endian.hpp"
+#include "cli/render_palette.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+
+namespace prolate::cli {
+namespace {
+
+// Where the ellipsoid has the point `u` of the unit sphere.
+std::array<float, 3> on(const Ellipsoid& e, const std::array<double, 3>& u) {
+    return {static_cast<float>(e.center.x + e.l11 * u[0]), static_cast<float>(e.center.y + e.l21 * u[0] + e.l22 * u[1]),
+            static_cast<float>(e.center.z + e.l31 * u[0] + e.l32 * u[1] + e.l33 * u[2])};
+}
+
+} // namespace
+
+std::string as_ply(std::span<const Piece> pieces, uint32_t segments) {
+    const SphereMesh sphere = sphere_mesh(segments);
+    std::string out = fmt::format("ply\nformat binary_little_endian 1.0\ncomment prolate export\n"
+                                  "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+                                  "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+                                  "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+                                  pieces.size() * sphere.vertices.size(), pieces.size() * sphere.triangles.size());
+    for (const Piece& piece : pieces)
+        for (const auto& u : sphere.vertices) {
+            for (const float x : on(piece.shape, u)) append_little_endian(out, x);
+            for (int i = 0; i < 3; ++i) out += static_cast<char>(std::lround(255 * srgb_encode(piece.colour[i])));
+        }
+    for (size_t i = 0; i < pieces.size(); ++i)
+        for (const auto& triangle : sphere.triangles) {
+            out += char{3};
+            for (const uint32_t corner : triangle)
+                append_little_endian(out, static_cast<uint32_t>(i * sphere.vertices.size()) + corner);
+        }
+    return out;
+}
+
+std::string as_obj(std::span<const Piece> pieces, uint32_t segments) {
+    const SphereMesh sphere = sphere_mesh(segments);
+    std::string out = "# prolate export\n";
+    const auto to = std::back_inserter(out);
+    size_t first = 1; // obj counts from 1
+    for (const Piece& piece : pieces) {
+        fmt::format_to(to, "o node_{}\n", piece.node);
+        const auto& colour = piece.colour;
+        const std::string shade =
+            fmt::format("{:.3f} {:.3f} {:.3f}", srgb_encode(colour.x), srgb_encode(colour.y), srgb_encode(colour.z));
+        for (const auto& u : sphere.vertices) {
+            const auto [x, y, z] = on(piece.shape, u);
+            fmt::format_to(to, "v {} {} {} {}\n", x, y, z, shade);
+        }
+        out += "s 1\n"; // smooth
+        for (const auto& [a, b, c] : sphere.triangles)
+            fmt::format_to(to, "f {} {} {}\n", first + a, first + b, first + c);
+        first += sphere.vertices.size();
+    }
+    return out;
+}
+
+} // namespace prolate::cli
