@@ -62,8 +62,8 @@ nlohmann::ordered_json mesh_of(const Mesh& mesh, NumberBlock& numbers) {
 }
 
 std::vector<float> to_floats(const std::vector<double>& values) {
-    std::vector<float> out;
-    for (const double value : values) out.push_back(static_cast<float>(value));
+    std::vector<float> out(values.size());
+    std::transform(values.begin(), values.end(), out.begin(), [](double value) { return static_cast<float>(value); });
     return out;
 }
 

@@ -91,7 +91,7 @@ private:
             }
             const std::byte* const block = side.block(node);
             const uint32_t lane = node % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
-            const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+            const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
             if (count > budget()) return Verdict::undecided;
             if (count <= kBlockLanes)
                 test(open, first, count, other, e.flags & kOtherIsLeaf);

@@ -184,7 +184,7 @@ private:
         const uint32_t node = side != 0 ? e.node_b : e.node_a, other = side != 0 ? e.node_a : e.node_b;
         const std::byte* const block = sides_[side].block(node);
         const uint32_t lane = node % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
-        const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+        const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
         if (count > budget()) return false;
         for (uint32_t i = 0; i < count; i += kBlockLanes)
             test(e, side, other, first + i, std::min(count - i, kBlockLanes));
@@ -195,7 +195,7 @@ private:
 
     // What opening a node, or looking at a leaf's triangles, will need: they are seldom in the cache.
     static HWY_INLINE void prefetch(const Side& side, const std::byte* block, uint32_t lane, bool leaf) {
-        const auto first = load_le<uint32_t>(block + kBlockFirst + 4 * lane);
+        const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
         if (leaf) {
             if (side.triangles != nullptr) hwy::Prefetch(side.triangles + size_t{first} * side.triangle_bytes);
         } else {
