@@ -52,7 +52,7 @@ class TwoTrees(QueryTest):
         self.assertGreater(answer["lower"], 0)
         self.assertLessEqual(answer["lower"], answer["upper"])
         self.assertEqual(self.js("viewer.marks.length"), 3, "a line and its two ends")
-        self.assertEqual(self.js("document.getElementById('verdict').textContent"), "separated")
+        self.assertEqual(self.js("document.getElementById('verdict-word').textContent"), "separated")
         gap = sum((a - b) ** 2 for a, b in zip(answer["pointA"], answer["pointB"])) ** 0.5
         self.assertAlmostEqual(gap, answer["upper"], places=4)
 
