@@ -4,6 +4,7 @@
 //
 // docs/covers.md says what each column means. Every bake runs in a process of its own, is measured on columns that it
 // did not optimise on, and takes all the cores that it is given; CPU seconds are those of all threads together.
+#include "bench/decompositions.hpp"
 #include "bench/measure.hpp"
 
 #include <CLI/CLI.hpp>
@@ -12,9 +13,7 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -198,6 +197,10 @@ void put(Json& row, const Figures& f) {
     row["hausdorff_p99"] = f.hausdorff_p99, row["sum_of_volumes"] = f.sum_of_volumes;
 }
 
+void put(Json& row, const Cost& c) {
+    row["cpu_seconds"] = c.cpu_seconds, row["wall_seconds"] = c.wall_seconds, row["megabytes"] = c.megabytes;
+}
+
 void put_published(Json& row, const std::string& model, uint32_t triangles, uint32_t count) {
     const Published p = published(model, triangles, count);
     row["published_naive"] = p.naive, row["published_vhacd"] = p.vhacd, row["published_amaa"] = p.amaa;
@@ -235,8 +238,8 @@ Json row_of(const std::string& path, const std::string& made_of, const BuildOpti
     const Figures& f = b.levels[l];
     put(row, f);
     row["proved"] = b.proved, row["goal_reached"] = b.goal_reached;
-    row["cpu_seconds"] = b.cost.cpu_seconds, row["wall_seconds"] = b.cost.wall_seconds;
-    row["megabytes"] = b.cost.megabytes, row["bytes"] = b.bytes, row["resolution"] = b.resolution;
+    put(row, b.cost);
+    row["bytes"] = b.bytes, row["resolution"] = b.resolution;
     row["outside_to_reference"] = f.outside_ratio / reference.outside;
     row["cpu_to_reference"] = b.cost.cpu_seconds / reference.cpu;
     put_published(row, stem(path), b.triangles, asked);
@@ -347,66 +350,31 @@ private:
 
     void peers(const std::string& path) {
         if (a_.peers.empty()) return;
-        if (!std::filesystem::exists(a_.peers))
-            return report_.note(fmt::format("peers: skipped, there is no {}; ./run peers installs them", a_.peers));
-        const std::vector<std::string> names = run_peers("list");
-        if (names.empty()) return report_.note("peers: skipped, none is installed; ./run peers installs them");
+        const Decomposers decomposers(a_.peers);
+        std::string why;
+        const std::vector<std::string> names = decomposers.names(why);
+        if (names.empty()) return report_.note(fmt::format("peers: skipped, {}", why));
         const auto model = load_model(path);
         if (!model) return;
-        const auto folder = std::filesystem::temp_directory_path() / fmt::format("prolate-cover-{}", getpid());
-        std::filesystem::create_directory(folder);
-        const std::string in = folder / "mesh.obj", out = folder / "hulls.obj";
-        write_wavefront(in, model->mesh);
         for (const std::string& name : names)
-            for (const uint32_t count : a_.counts) peer(path, *model, name, count, in, out);
-        std::filesystem::remove_all(folder);
+            for (const uint32_t count : a_.counts) peer(path, *model, decomposers, name, count);
     }
 
-    void peer(const std::string& path, const Model& model, const std::string& name, uint32_t count,
-              const std::string& in, const std::string& out) {
-        std::filesystem::remove(out);
-        const auto lines = run_peers(fmt::format("{} {} {} '{}' '{}'", name, count, a_.peer_seconds, in, out));
-        const Json cost = lines.empty() ? Json() : Json::parse(lines.back(), nullptr, false);
-        if (!cost.is_object() || !std::filesystem::exists(out))
-            return report_.note(fmt::format("{} {}: gave nothing within {} s", name, count, a_.peer_seconds));
-        const auto figures = in_child([&] { // oneTBB's threads must not be there when the next bake forks
-            Figures f;
-            if (const auto hulls = load_mesh(out.c_str()))
-                f = Judge(model, a_.columns).hulls(hulls->view(), cost["hulls"].get<uint32_t>());
-            return f;
-        });
+    void peer(const std::string& path, const Model& model, const Decomposers& decomposers, const std::string& name,
+              uint32_t count) {
+        const auto made = decomposers.run(name, model.mesh.view(), count, a_.peer_seconds);
+        if (!made) return report_.note(fmt::format("{} {}: gave nothing within {} s", name, count, a_.peer_seconds));
+        // In a child: oneTBB's threads must not be there when the next bake forks.
+        const auto figures = in_child([&] { return Judge(model, a_.columns).hulls(made->hulls.view(), made->count); });
         if (!figures) return report_.note(fmt::format("{} {}: its hulls cannot be measured", name, count));
-        Json row{
-            {"model", stem(path)},    {"triangles", model.mesh.triangles.size()},
-            {"closed", model.closed}, {"made_of", fmt::format("{} {} hulls", name, cost["version"].get<std::string>())},
-            {"primitive", "hull"},    {"asked", count}};
+        Json row{{"model", stem(path)},    {"triangles", model.mesh.triangles.size()},
+                 {"closed", model.closed}, {"made_of", fmt::format("{} {} hulls", name, made->version)},
+                 {"primitive", "hull"},    {"asked", count}};
         put(row, *figures);
         row["proved"] = false;
-        for (const char* key : {"cpu_seconds", "wall_seconds", "megabytes"}) row[key] = cost[key];
+        put(row, made->cost);
         put_published(row, stem(path), static_cast<uint32_t>(model.mesh.triangles.size()), count);
         report_.add(row);
-    }
-
-    // The lines that decompose.py prints with these arguments.
-    std::vector<std::string> run_peers(const std::string& arguments) const {
-        const std::string command =
-            fmt::format("'{}' '{}' {} 2>/dev/null", a_.peers, PROLATE_BENCH_FOLDER "/decompose.py", arguments);
-        std::string text;
-        if (FILE* pipe = popen(command.c_str(), "r")) {
-            char buffer[4096];
-            while (const size_t n = fread(buffer, 1, sizeof buffer, pipe)) text.append(buffer, n);
-            pclose(pipe);
-        }
-        std::vector<std::string> lines;
-        std::istringstream in(text);
-        for (std::string line; std::getline(in, line);) lines.push_back(line);
-        return lines;
-    }
-
-    static void write_wavefront(const std::string& path, const Mesh& mesh) {
-        std::ofstream file(path);
-        for (const Vec3& v : mesh.vertices) file << fmt::format("v {} {} {}\n", v.x, v.y, v.z);
-        for (const Triangle& t : mesh.triangles) file << fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
     }
 
     const Arguments& a_;

@@ -15,6 +15,8 @@
 namespace prolate::bench {
 namespace {
 
+constexpr double kHullSpacing = 0.005; // of samples on hulls, parts of the diagonal
+
 double seconds(const timeval& t) {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
@@ -131,7 +133,11 @@ std::optional<Model> load_model(const std::string& path) {
 
 Judge::Judge(const Model& model, int columns_across)
     : winding_(model.mesh.view()), solid_(measuring_columns(model.mesh.view(), model.closed, winding_, columns_across)),
-      volume_(solid_.volume().value) {}
+      volume_(solid_.volume().value), closed_(model.closed) {
+    Eigen::AlignedBox3d box;
+    for (const Vec3& v : model.mesh.vertices) box.extend(to_vec(v));
+    diagonal_ = box.diagonal().norm();
+}
 
 Figures Judge::ellipsoids(std::span<const Ellipsoid> cover) const {
     const CoverVolume volume = measure_cover(solid_, cover);
@@ -147,6 +153,26 @@ Figures Judge::ellipsoids(std::span<const Ellipsoid> cover) const {
     return out;
 }
 
+// The largest distance from evenly spread points of `surface` to the solid. A hull's farthest point is on its surface
+// unless it fills a cavity.
+double Judge::farthest(MeshView surface) const {
+    double far = 0;
+    const double spacing = kHullSpacing * diagonal_;
+    for (const Triangle& t : surface.triangles) {
+        const Vec a = to_vec(surface.vertices[t[0]]), b = to_vec(surface.vertices[t[1]]),
+                  c = to_vec(surface.vertices[t[2]]);
+        const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+        const int n = std::max(1, static_cast<int>(std::ceil(longest / spacing)));
+        for (int i = 0; i <= n; ++i)
+            for (int j = 0; j <= n - i; ++j) {
+                const Vec p = a + (b - a) * i / n + (c - a) * j / n;
+                const double distance = winding_.tree().distance(p);
+                if (distance > far && !(closed_ && std::abs(winding_(p)) > 0.5)) far = distance;
+            }
+    }
+    return far;
+}
+
 Figures Judge::hulls(MeshView hulls, uint32_t count) const {
     int added = 0;
     const Columns cover(hulls, true, Winding(hulls), grown_around(solid_.lattice(), hulls, added));
@@ -159,6 +185,7 @@ Figures Judge::hulls(MeshView hulls, uint32_t count) const {
     common *= solid_.lattice().dx * solid_.lattice().dy;
     Figures out;
     out.count = count;
+    out.hausdorff_max = 100 * farthest(hulls) / diagonal_;
     if (!(volume_ > 0)) return out;
     out.outside_ratio = (cover.volume().value - common) / volume_;
     out.uncovered = 1 - common / volume_;

@@ -77,8 +77,8 @@ int run(const Arguments& a) {
                     // After each row: a long run that is interrupted has its files.
                     if (!a.csv.empty()) fmt::output_file(a.csv).print("{}", rows);
                     if (!a.svg.empty())
-                        fmt::output_file(a.svg).print(
-                            "{}", log_log_plot("Cost of a bake", "nodes of the tree", {time, memory}));
+                        fmt::output_file(a.svg).print("{}", log_log_plot("Cost of a bake", "nodes of the tree",
+                                                                         {time, memory}, {.slope_of_one = true}));
                 }
             }
     return failed ? 1 : 0;
