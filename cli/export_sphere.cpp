@@ -1,5 +1,5 @@
-// Rings of equal latitude: ring r from a pole to the equator has 4 r points, equally spaced. So no edge is twice as long
-// as another, and each octant of the sphere is cut like a face of a refined octahedron.
+// Rings of equal latitude: ring r from a pole to the equator has 4 r points, equally spaced. So no edge is twice as
+// long as another, and each octant of the sphere is cut like a face of a refined octahedron.
 #include "cli/export_sphere.hpp"
 
 #include <algorithm>
