@@ -3,17 +3,21 @@
 //
 //   bench_curves horse.obj bunny.obj --peers build/peers/bin/python --out out/curves
 //
-// Figures of trees are those in their files, measured when they were baked. Hulls are judged on columns of the same
-// solid, and their distance is sampled: it may be too small, by no more than the samples' spacing.
+// Known models have published outside ratios of V-HACD's hulls and of AMAA's spheres beside them. What a package of
+// V-HACD gives with its defaults is plotted only if asked for (--peers): it may be far from the published. Figures of
+// trees are those in their files, measured when they were baked. Hulls are judged on columns of the same solid, and
+// their distance is sampled: it may be too small, by no more than the samples' spacing.
 #include "bench/covers.hpp"
 #include "bench/decompositions.hpp"
 #include "bench/plot.hpp"
+#include "bench/published.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/os.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 namespace prolate::bench {
@@ -38,8 +42,10 @@ struct Row {
 };
 
 void print(const Row& r) {
-    fmt::print("{:<10}{:<18}{:>6}{:>9}{:>10}{:>10.4f}{:>9.2f}{:>10.4f}\n", r.model, r.made_of, r.count, r.bytes,
-               r.file_bytes ? fmt::format("{}", r.file_bytes) : "-", r.outside_ratio, r.hausdorff, r.uncovered);
+    const auto known = [](double x, int digits) { return std::isnan(x) ? "-" : fmt::format("{:.{}f}", x, digits); };
+    fmt::print("{:<10}{:<25}{:>6}{:>9}{:>10}{:>10}{:>9}{:>10}\n", r.model, r.made_of, r.count,
+               r.bytes ? fmt::format("{}", r.bytes) : "-", r.file_bytes ? fmt::format("{}", r.file_bytes) : "-",
+               known(r.outside_ratio, 4), known(r.hausdorff, 2), known(r.uncovered, 4));
     std::fflush(stdout);
 }
 
@@ -72,6 +78,19 @@ void add_trees(const Model& model, const Arguments& a, std::vector<Row>& rows) {
         }
 }
 
+// Volumes alone were published.
+void add_published(const Model& model, std::vector<Row>& rows) {
+    for (const bool hulls : {false, true})
+        for (const Published& p : all_published()) {
+            const double ratio = hulls ? p.vhacd : p.amaa;
+            if (p.model != model.name || p.triangles != model.mesh.triangles.size() || std::isnan(ratio)) continue;
+            Row row{model.name, hulls ? "V-HACD hulls, published" : "AMAA spheres, published", p.count, p.count};
+            if (!hulls) row.bytes = p.count * kSphereBytes;
+            row.outside_ratio = ratio, row.uncovered = kUnknown;
+            print(rows.emplace_back(row));
+        }
+}
+
 void add_peers(const Model& model, const Arguments& a, std::vector<Row>& rows) {
     std::string why;
     const Decomposers decomposers(a.peers);
@@ -98,6 +117,14 @@ void add_peers(const Model& model, const Arguments& a, std::vector<Row>& rows) {
     }
 }
 
+// What a legend says of one kind: hulls that leave much of the solid out are no cover.
+std::string label_of(const std::string& kind, const std::vector<Row>& rows) {
+    double most = 0;
+    for (const Row& r : rows)
+        if (r.made_of == kind) most = std::max(most, r.uncovered);
+    return most < 0.001 ? kind : fmt::format("{} (no cover: up to {:.0f} % of the solid left out)", kind, 100 * most);
+}
+
 std::string plot(const std::vector<Row>& rows, bool by_bytes) {
     std::vector<std::string> models, kinds;
     for (const Row& r : rows) {
@@ -109,13 +136,13 @@ std::string plot(const std::vector<Row>& rows, bool by_bytes) {
         for (const std::string& model : models) {
             Panel panel{volume ? model : "", volume ? "outside ratio" : "Hausdorff distance, % of the diagonal", {}};
             for (const std::string& kind : kinds) {
-                Series s{kind, {}};
+                Series s{label_of(kind, rows), {}};
                 for (const Row& r : rows) {
                     const double x = static_cast<double>(by_bytes ? r.bytes : r.count);
                     const double y = volume ? r.outside_ratio : r.hausdorff;
-                    if (r.model == model && r.made_of == kind && y > 0) s.points.emplace_back(x, y);
+                    if (r.model == model && r.made_of == kind && x > 0 && y > 0) s.points.emplace_back(x, y);
                 }
-                panel.series.push_back(std::move(s));
+                if (!s.points.empty()) panel.series.push_back(std::move(s));
             }
             panels.push_back(std::move(panel));
         }
@@ -127,12 +154,13 @@ std::string plot(const std::vector<Row>& rows, bool by_bytes) {
 int run(const Arguments& a) {
     std::filesystem::create_directories(a.out);
     std::vector<Row> rows;
-    fmt::print("{:<10}{:<18}{:>6}{:>9}{:>10}{:>10}{:>9}{:>10}\n", "model", "", "n", "bytes", "file", "outside", "H max",
+    fmt::print("{:<10}{:<25}{:>6}{:>9}{:>10}{:>10}{:>9}{:>10}\n", "model", "", "n", "bytes", "file", "outside", "H max",
                "uncov.");
     for (const std::string& path : a.meshes) {
         const auto model = load_model(path);
         if (!model) return 1;
         add_trees(*model, a, rows);
+        add_published(*model, rows);
         if (!a.peers.empty()) add_peers(*model, a, rows);
         // After each model: a long run that is interrupted has its files.
         fmt::output_file(a.out + "/curves.csv").print("{}", csv_of(rows, a.quality));

@@ -86,7 +86,8 @@ std::string ticks(const Axis& x, const Axis& y) {
             for (int digit = 1; digit < 10; ++digit) {
                 const double value = digit * std::pow(10, e), at = std::log10(value);
                 if (at < axis.low - 1e-9 || at > axis.high + 1e-9) continue;
-                const bool labelled = digit == 1 || (axis.high - axis.low < 2.6 && (digit == 2 || digit == 5));
+                const bool roomy = axis.high - axis.low < 2.6 && value < 1000; // long numbers would touch
+                const bool labelled = digit == 1 || (roomy && (digit == 2 || digit == 5));
                 draw(axis(value), labelled ? plain(digit, e) : "");
             }
     };

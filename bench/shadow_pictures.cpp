@@ -22,7 +22,7 @@ std::string vector(const dvec3& v) {
     return fmt::format("<{:.14g}, {:.14g}, {:.14g}>", v.x, v.y, v.z);
 }
 
-// All but the camera and the object.
+// All but the camera and the object. The plane is a hair below the soles: a triangle in it would look lit.
 std::string surroundings(const Stage& stage) {
     const Lamp lamp = stage.lamp(0);
     return fmt::format("#version 3.7;\nglobal_settings {{ assumed_gamma 1 }}\nbackground {{ color rgb 1 }}\n"
@@ -31,7 +31,7 @@ std::string surroundings(const Stage& stage) {
                        "plane {{ {}, {:.14g} pigment {{ color rgb 1 }} finish {{ ambient 0.28 diffuse 0.75 }} }}\n"
                        "#declare Only_Cover = true;\n",
                        vector(lamp.center), vector(lamp.side), vector(lamp.other_side), vector(stage.eye()),
-                       vector(stage.up()), stage.ground_height());
+                       vector(stage.up()), stage.ground_height() - 1e-4 * stage.radius());
 }
 
 std::string scene_of_object(const Stage& stage, const Exhibit& exhibit) {
