@@ -153,8 +153,9 @@ std::string log_log_plot(const std::string& title, const std::string& x_label, c
             for (const auto& p : s.points) y_range.add(p.second);
         const auto [x0, x1] = x_ranges[panel.x_label].limits();
         const auto [y0, y1] = y_range.limits();
-        const double left = static_cast<double>(at % columns) * (kWide + kLeft) + kLeft;
-        const double top = kHead + static_cast<double>(at / columns) * (kTop + kHigh + kBelow) + kTop;
+        const size_t row = at / columns, column = at % columns;
+        const double left = static_cast<double>(column) * (kWide + kLeft) + kLeft;
+        const double top = kHead + static_cast<double>(row) * (kTop + kHigh + kBelow) + kTop;
         const Axis x{x0, x1, left, left + kWide}, y{y0, y1, top + kHigh, top};
         out += ticks(x, y);
         out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
