@@ -202,7 +202,7 @@ TEST_F(Export, GlbIsWhatTheSpecificationAsksFor) {
                                           "materials", "buffers", "bufferViews", "accessors"};
         for (const auto& [key, value] : gltf.items()) EXPECT_TRUE(known.contains(key)) << key;
         EXPECT_EQ(gltf["asset"]["version"], "2.0");
-        EXPECT_EQ(gltf["scenes"].at(gltf["scene"].get<size_t>())["nodes"], Json({0}));
+        EXPECT_EQ(gltf["scenes"].at(gltf["scene"].get<size_t>())["nodes"], Json::array({0}));
         // One node holds all others, each of which appears once: a tree, as is asked for.
         std::set<size_t> children;
         for (const Json& child : gltf["nodes"][0]["children"]) EXPECT_TRUE(children.insert(child.get<size_t>()).second);
