@@ -252,5 +252,10 @@ RaycastResult raycast_cut(const TreeView& tree, const Pose& pose, const Ray& ray
     return cast(tree, pose, ray, context, options, false, growth.data());
 }
 
+RaycastResult raycast_cut_any(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
+                              QueryContext& context, const QueryOptions& options) noexcept {
+    return cast(tree, pose, ray, context, options, true, growth.data());
+}
+
 } // namespace prolate
 #endif // HWY_ONCE

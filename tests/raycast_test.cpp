@@ -657,7 +657,11 @@ TEST(Raycast, CutsAreMetWhole) {
                 const RaycastResult result = raycast_cut(tree, pose, ray, growth, context(), options);
                 ASSERT_EQ(result.verdict == Verdict::overlapping, std::isfinite(truth)) << n << ' ' << level;
                 ++(std::isfinite(truth) ? met : missed);
+                const RaycastResult any = raycast_cut_any(tree, pose, ray, growth, context(), options);
+                ASSERT_EQ(any.verdict, result.verdict);
+                ASSERT_LE(any.stats.pair_tests, result.stats.pair_tests);
                 if (!std::isfinite(truth)) continue;
+                ASSERT_GE(any.t, result.t);
                 ASSERT_NEAR(result.t, static_cast<double>(truth), 1e-5);
                 ASSERT_EQ(result.triangle, kNoTriangle);
                 cut_off += !(cast(tree, pose, ray, options).t <= result.t * (1 + 1e-5));

@@ -65,6 +65,10 @@ RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray
 RaycastResult raycast_cut(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
                           QueryContext& context, const QueryOptions& options = {}) noexcept;
 
+/// The same, but stops at any hit, as raycast_any() does.
+RaycastResult raycast_cut_any(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
+                              QueryContext& context, const QueryOptions& options = {}) noexcept;
+
 /// growth[node]: the factor by which a node must grow about its center to hold all nodes below it, at least 1. For all
 /// slots: growth has tree.slot_count() elements. Takes some microseconds a node.
 void node_growth(const TreeView& tree, std::span<float> growth) noexcept;
