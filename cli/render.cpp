@@ -12,13 +12,16 @@
 namespace prolate::cli {
 namespace {
 
+constexpr const char* kMeshStyles[] = {"beside", "overlay", "none"}; // in the order of MeshStyle
+
 struct RenderArguments {
     std::string tree, mesh, output;
     std::string size = "1600x1200";
     std::vector<double> view = {View{}.azimuth, View{}.elevation};
     std::vector<uint32_t> levels;
-    std::string up = "y";
-    bool no_shadow = false;
+    std::string up = "y", mesh_style = "beside", section;
+    bool no_shadow = false, heat = false;
+    double heat_top = 0;
     uint32_t samples = SheetOptions{}.samples, threads = 0;
 };
 
@@ -31,12 +34,45 @@ bool parse_size(const std::string& text, uint32_t& width, uint32_t& height) {
     return second == std::errc() && rest == end;
 }
 
+// "z" or "z,0.4"
+bool parse_section(const std::string& text, std::optional<SectionPlane>& section) {
+    if (text.empty()) return true;
+    if (text[0] < 'x' || text[0] > 'z') return false;
+    SectionPlane plane{static_cast<uint32_t>(text[0] - 'x'), SectionPlane{}.at};
+    if (text.size() > 1) {
+        const char* const end = text.data() + text.size();
+        const auto [rest, error] = std::from_chars(text.data() + 2, end, plane.at);
+        if (text[1] != ',' || error != std::errc() || rest != end) return false;
+    }
+    section = plane;
+    return true;
+}
+
+template <size_t kCount> size_t index_of(const char* const (&words)[kCount], const std::string& word) {
+    return static_cast<size_t>(std::find(std::begin(words), std::end(words), word) - std::begin(words));
+}
+
+template <size_t kCount> CLI::IsMember one_of(const char* const (&words)[kCount]) {
+    return CLI::IsMember(std::vector<std::string>(std::begin(words), std::end(words)));
+}
+
 int run(const RenderArguments& a) {
     SheetOptions options;
     if (!parse_size(a.size, options.width, options.height))
         return complain(kUsage, "--size", "not a size in pixels", "write it as 1600x1200");
     if (const std::string kind = extension(a.output); !kind.empty() && kind != "png")
         return complain(kUsage, a.output, "render writes PNG files only", "end the name in .png");
+    if (!parse_section(a.section, options.section))
+        return complain(kUsage, "--section", "not a plane across an axis",
+                        "write it as x, y or z, or with a part of the extent, as z,0.4");
+    options.heat = a.heat || a.heat_top > 0;
+    options.heat_top = a.heat_top;
+    if (a.mesh.empty() && (options.heat || a.mesh_style == "overlay"))
+        return complain(kUsage, options.heat ? "--heat" : "--mesh overlay", "there is no mesh",
+                        "name the mesh after the tree");
+    if (options.heat && a.mesh_style == "overlay")
+        return complain(kUsage, "--heat", "colours cannot be told when the mesh shines through",
+                        "leave out --mesh overlay, or try --section");
     int code = kDone;
     const auto tree = read_tree(a.tree, code);
     if (!tree) return code;
@@ -56,15 +92,15 @@ int run(const RenderArguments& a) {
     if (options.levels.empty())
         for (uint32_t level = std::min(1u, view.level_count() - 1); level < std::min(4u, view.level_count()); ++level)
             options.levels.push_back(level);
-    const auto axis = std::find(std::begin(kUpAxes), std::end(kUpAxes), a.up) - std::begin(kUpAxes);
-    options.view = {a.view[0], a.view[1], static_cast<UpAxis>(axis)};
+    options.view = {a.view[0], a.view[1], static_cast<UpAxis>(index_of(kUpAxes, a.up))};
+    options.mesh_style = static_cast<MeshStyle>(index_of(kMeshStyles, a.mesh_style));
     options.samples = a.samples;
     options.threads = a.threads;
     options.floor_shadow = !a.no_shadow;
     const auto rendered = [&] {
         ProgressLine line;
         options.progress = [&line](double fraction) { return line.show("rendering", fraction); };
-        return render_sheet(view, mesh ? std::optional(mesh->mesh.view()) : std::nullopt, options);
+        return render_sheet(view, mesh ? &*mesh : nullptr, options);
     }();
     if (!rendered) return complain("render", rendered.error());
     const auto png = encode_png(*rendered);
@@ -78,7 +114,7 @@ void add_render(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<RenderArguments>();
     CLI::App* command = app.add_subcommand("render", "Picture the levels of a tree beside its mesh, as a PNG file");
     command->add_option("tree", a->tree, "the .etree file")->required();
-    command->add_option("mesh", a->mesh, "the mesh that it was baked from, for the first panel");
+    command->add_option("mesh", a->mesh, "the mesh that it was baked from");
     command->add_option("-o,--output", a->output, "the PNG file to write, or - for standard output")->required();
     command->add_option("--size", a->size, "width and height of the picture, pixels")->capture_default_str();
     command->add_option("--levels", a->levels, "levels to show, as 0,1,2 (default: 1, 2 and 3, as far as they exist)")
@@ -88,8 +124,22 @@ void add_render(CLI::App& app, Work& chosen) {
         ->delimiter(',')
         ->expected(2);
     command->add_option("--up", a->up, "the model's axis that points up")
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
+        ->check(one_of(kUpAxes))
         ->capture_default_str();
+    command
+        ->add_option("--mesh", a->mesh_style,
+                     "the mesh: in a panel beside, as an overlay seen through the ellipsoids, or none")
+        ->check(one_of(kMeshStyles))
+        ->capture_default_str();
+    command->add_option(
+        "--section", a->section,
+        "cut away the viewer's side of a plane across x, y or z, halfway or as z,0.4 says, and show the "
+        "mesh's section in the tree's");
+    command->add_flag("--heat", a->heat, "colour by how far the tree sticks out of the mesh, and give max and mean");
+    command
+        ->add_option("--heat-top", a->heat_top,
+                     "the same, with the legend's end at so many % of the diagonal (default: as needed)")
+        ->check(CLI::PositiveNumber);
     command->add_option("--samples", a->samples, "light samples a pixel, 16 ... 1024")->capture_default_str();
     command->add_option("--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--no-shadow", a->no_shadow, "leave out the shadow on the floor");

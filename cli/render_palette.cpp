@@ -36,6 +36,19 @@ bool in_gamut(const dvec3& rgb) {
 constexpr std::array<uint32_t, 8> kUniversal = {0x0072B2, 0xE69F00, 0x009E73, 0xCC79A7,
                                                 0x56B4E9, 0xD55E00, 0xF0E442, 0x882255};
 
+// Every eighth of the map; between them it is straight enough, to 3 of 255.
+constexpr std::array<uint32_t, 9> kViridis = {0x440154, 0x472C7A, 0x3B518B, 0x2C718E, 0x21908D,
+                                              0x27AD81, 0x5CC863, 0xAADC32, 0xFDE725};
+
+// "0xRRGGBB" in 0 ... 1, as encoded.
+dvec3 channels(uint32_t rgb) {
+    return dvec3(rgb >> 16 & 255, rgb >> 8 & 255, rgb & 255) / 255.0;
+}
+
+dvec3 decoded(const dvec3& encoded) {
+    return {srgb_decode(encoded.x), srgb_decode(encoded.y), srgb_decode(encoded.z)};
+}
+
 // 0, 1/2, 1/4, 3/4, 1/8, ...: any first few are far apart.
 double van_der_corput(uint32_t i) {
     double value = 0;
@@ -73,11 +86,7 @@ dvec3 to_linear_rgb(Oklch colour) {
 }
 
 Oklch branch_colour(uint32_t i, uint32_t n) {
-    if (n <= kUniversal.size()) {
-        const uint32_t rgb = kUniversal[i % kUniversal.size()];
-        const auto channel = [rgb](int shift) { return srgb_decode(((rgb >> shift) & 255u) / 255.0); };
-        return to_oklch({channel(16), channel(8), channel(0)});
-    }
+    if (n <= kUniversal.size()) return to_oklch(decoded(channels(kUniversal[i % kUniversal.size()])));
     static constexpr double kLightness[3] = {0.62, 0.78, 0.5};
     // Around the circle, the last must differ from the first, too.
     const uint32_t shade = i + 1 == n && n % 3 == 1 ? 1 : i % 3;
@@ -103,6 +112,12 @@ std::vector<Oklch> node_colours(const TreeView& tree) {
         }
     });
     return colours;
+}
+
+dvec3 heat_colour(double share) {
+    const double at = std::clamp(share, 0.0, 1.0) * (kViridis.size() - 1);
+    const size_t i = std::min(static_cast<size_t>(at), kViridis.size() - 2);
+    return decoded(glm::mix(channels(kViridis[i]), channels(kViridis[i + 1]), at - static_cast<double>(i)));
 }
 
 } // namespace prolate::cli

@@ -34,4 +34,8 @@ inline constexpr Oklch kNeutral = {0.80, 0.004, 1.2};
 /// ancestor's, so that neighbouring siblings can be told apart.
 std::vector<Oklch> node_colours(const TreeView& tree);
 
+/// Linear sRGB of a share in 0 ... 1 (beyond: as at the end) on the map "viridis" of S. van der Walt and N. Smith
+/// (2015; CC0): equal steps look equal, also to readers with any common colour vision and in grey.
+glm::dvec3 heat_colour(double share);
+
 } // namespace prolate::cli

@@ -1,12 +1,14 @@
 // Each pixel is sampled on a jittered grid. A tile first traces the primary rays of its pixels and of a border around
 // them, so that each sample can see whether its neighbours hit something else (an outline), then shades its samples.
+// What is seen through another scene is a second layer of the same kind.
 // All random numbers are hashes of the pixel and the sample, so tiles can be rendered in any order, on any thread.
 //
 // Light: a key light of finite size from above the viewer's left shoulder, and a white sky dimmed by ambient
-// occlusion; one shadow ray and one sky ray a sample, stratified over the samples of a pixel.
+// occlusion; one shadow ray and one sky ray a sample, stratified over the samples of a pixel. Sections are flat: they
+// get no light, so that their colours are true. What is cut away throws no shadow.
 //
 // Cost: about three rays for each of width * height * grid^2 samples that see the scene, two where the floor may be in
-// shadow, one elsewhere.
+// shadow, one elsewhere; paint once a pixel, or where it shows several parts, a few times.
 #include "cli/render_panel.hpp"
 
 #include <algorithm>
@@ -32,6 +34,7 @@ constexpr double kCrease = 0.02;       // a gap in depth that is drawn as an out
 constexpr double kOutlineShade = 0.32; // what is left of the colour on an outline
 constexpr double kFloorReach = 1.7;    // radius around the scene in which the floor shadow fades out
 constexpr double kFloorDarkness = 0.42;
+constexpr double kGlass = 0.42; // opacity of a surface that lets others be seen, where it faces the viewer
 
 // A hash of three numbers; the mixer is the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
 uint64_t mix(uint64_t x, uint64_t y, uint64_t salt) {
@@ -70,11 +73,14 @@ double to_32nd(double x) {
     return x;
 }
 
-// What all samples of a panel share.
+// One layer of a panel: what all of its samples share.
 class Painter {
 public:
-    Painter(const Scene& scene, const std::vector<dvec3>& colours, const PanelSettings& s)
-        : scene_(scene), colours_(colours), s_(s), bounds_(scene.window(s.camera)), floor_(-scene.extent(-s.up)) {
+    // `inset`, if there is one, is drawn in sections.
+    Painter(const Scene& scene, const PanelContent& content, const Scene* inset, const PanelSettings& s)
+        : scene_(scene), inset_(inset), content_(content), s_(s), bounds_(scene.window(s.camera)),
+          floor_(-scene.extent(-s.up)) {
+        if (inset) bounds_.add(inset->window(s.camera));
         // Wider than the rounding of a triangle's corner to float.
         bounds_ = {bounds_.u0 - 1e-5, bounds_.u1 + 1e-5, bounds_.v0 - 1e-5, bounds_.v1 + 1e-5};
         const Camera& c = s.camera;
@@ -104,11 +110,32 @@ public:
         return glm::normalize(s_.camera.direction(p.x, p.y));
     }
 
-    Hit hit(int x, int y) const {
+    // The last points of a section whose places were asked for.
+    struct Known {
+        struct Point {
+            dvec3 at{0};
+            Place place;
+        };
+        Point scene, inset;
+    };
+
+    Hit hit(int x, int y, Known& known) const {
         const dvec2 p = slopes(x, y);
         if (p.x < bounds_.u0 || p.x > bounds_.u1 || p.y < bounds_.v0 || p.y > bounds_.v1) return {};
-        return scene_.first_hit(s_.camera.eye, glm::normalize(s_.camera.direction(p.x, p.y)));
+        const dvec3 &eye = s_.camera.eye, direction = glm::normalize(s_.camera.direction(p.x, p.y));
+        const Reach reach = kept(eye, direction);
+        if (reach.empty()) return {};
+        if (reach.from > 0) {
+            const dvec3 at = eye + reach.from * direction;
+            uint32_t id = inset_ ? id_at(at, *inset_, known.inset) : kNothing;
+            if (id == kNothing) id = id_at(at, scene_, known.scene);
+            if (id != kNothing) return {reach.from, id, true, s_.section->normal};
+        }
+        return scene_.first_hit(eye, direction, reach);
     }
+
+    dvec3 point(const Hit& hit, const dvec3& direction) const { return s_.camera.eye + hit.distance * direction; }
+    dvec3 paint(const Hit& hit, const dvec3& at) const { return content_.paint(hit, at); }
 
     // Whether these pixels show neither the scene nor its shadow.
     bool is_blank(uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1) const {
@@ -117,21 +144,23 @@ public:
         return u1 < drawn_.u0 || u0 > drawn_.u1 || v1 < drawn_.v0 || v0 > drawn_.v1;
     }
 
-    dvec3 surface(const Hit& hit, const dvec3& direction, uint32_t sample, const dvec2& shift) const {
+    // What light makes of `colour` at a hit.
+    dvec3 lit(const dvec3& colour, const Hit& hit, const dvec3& direction, uint32_t sample, const dvec2& shift) const {
+        if (hit.in_section) return colour;
         const dvec3& n = hit.normal;
         // Off the surface by more than the rounding of the hit distance.
-        const dvec3 p = s_.camera.eye + hit.distance * direction + 1e-5 * n;
+        const dvec3 p = point(hit, direction) + 1e-5 * n;
         const dvec2 random = spread(sample, shift);
         const dvec3 to_key = cone_direction(key_, random, 0.12);
         const double facing = glm::dot(n, to_key);
-        const double key = facing > 0 && !scene_.blocked(p, to_key) ? facing : 0;
+        const double key = facing > 0 && !blocked(p, to_key) ? facing : 0;
         // The other order of coordinates: the sky ray must not follow the key ray.
         const dvec3 to_sky = cone_direction(n, {random.y, random.x}, 1);
         const double sky_here = 0.8 + 0.2 * glm::dot(to_sky, s_.up);
-        const double sky = scene_.blocked(p, to_sky) ? 0.12 : sky_here;
+        const double sky = blocked(p, to_sky) ? 0.12 : sky_here;
         const dvec3 half = glm::normalize(to_key - direction);
         const double gloss = key > 0 ? 0.10 * to_32nd(std::max(0.0, glm::dot(n, half))) : 0;
-        return colours_[hit.id] * (0.60 * sky + 0.62 * key) + gloss;
+        return colour * (1 + content_.relief * (0.60 * sky + 0.62 * key - 1)) + content_.relief * gloss;
     }
 
     // White paper, darker where the scene hides the sky over the floor.
@@ -145,10 +174,25 @@ public:
                             smooth_step(0, 0.15, distance_to_border(direction));
         if (fade <= 0) return dvec3(1);
         const dvec3 to_light = cone_direction(glm::normalize(0.45 * key_ + s_.up), spread(sample, shift), 0.75);
-        return dvec3(scene_.blocked(p + 1e-5 * s_.up, to_light) ? 1 - kFloorDarkness * fade : 1.0);
+        return dvec3(blocked(p + 1e-5 * s_.up, to_light) ? 1 - kFloorDarkness * fade : 1.0);
     }
 
+    // What is left of a colour on an outline.
+    double ink() const { return 1 - content_.relief * (1 - kOutlineShade); }
+
 private:
+    // Most samples are nearer to the last one than any surface: then they are where it is.
+    static uint32_t id_at(const dvec3& at, const Scene& scene, Known::Point& last) {
+        if (!(glm::distance(at, last.at) < 0.999 * last.place.clear)) last = {at, scene.place_of(at)};
+        return last.place.id;
+    }
+    Reach kept(const dvec3& origin, const dvec3& direction) const {
+        return s_.section ? s_.section->clip(origin, direction) : Reach{};
+    }
+    bool blocked(const dvec3& origin, const dvec3& direction) const {
+        const Reach reach = kept(origin, direction);
+        return !reach.empty() && scene_.blocked(origin, direction, reach);
+    }
     // Of the point where the ray meets the image, as a part of the image's width or height; the floor shadow must not
     // be cut off at the border.
     double distance_to_border(const dvec3& direction) const {
@@ -167,9 +211,10 @@ private:
     }
 
     const Scene& scene_;
-    const std::vector<dvec3>& colours_;
+    const Scene* inset_;
+    const PanelContent& content_;
     const PanelSettings& s_;
-    Window bounds_; // of the scene; no ray beyond meets it
+    Window bounds_; // of all that is drawn; no ray beyond meets it
     Window drawn_;  // of the scene and its shadow
     double floor_;
     dvec3 key_, foot_;
@@ -186,10 +231,11 @@ public:
         const int pixel_rows = rows + 2 * border_;
         hits_.resize(static_cast<size_t>(columns_) * pixel_rows * grid_);
         ranges_.resize(static_cast<size_t>(pixel_columns_) * pixel_rows);
+        Painter::Known known;
         for (int y = 0; y < pixel_rows * grid_; ++y)
             for (int x = 0; x < columns_; ++x) {
                 Hit& hit = hits_[static_cast<size_t>(y) * columns_ + x];
-                hit = painter.hit(x0_ + x, y0_ + y);
+                hit = painter.hit(x0_ + x, y0_ + y, known);
                 ranges_[static_cast<size_t>(y / grid_) * pixel_columns_ + x / grid_].add(hit);
             }
         for (int i = 0; i < kRing; ++i) {
@@ -209,7 +255,7 @@ public:
         for (int y = cy - border_; y <= cy + border_; ++y)
             for (int x = cx - border_; x <= cx + border_; ++x)
                 all.add(ranges_[static_cast<size_t>(y) * pixel_columns_ + x]);
-        return all.first == all.last && (all.first == kNothing || all.far <= all.near + kCrease);
+        return all.first == all.last && (all.first == Hit{}.part() || all.far <= all.near + kCrease);
     }
 
     // Whether a sample that hit something has a neighbour, at the distance of a line's width, that hit something
@@ -220,18 +266,18 @@ public:
         return std::any_of(ring_.begin(), ring_.end(), [&](ptrdiff_t offset) {
             const Hit& other = hits_[at + offset];
             if (other.id == kNothing) return true;
-            if (other.id != mine.id) return other.distance >= mine.distance;
+            if (other.part() != mine.part()) return other.distance >= mine.distance;
             return other.distance > mine.distance + kCrease && glm::dot(mine.normal, other.normal) < 0.9;
         });
     }
 
 private:
     static constexpr int kRing = 12;
-    // Ids and distances in one or more pixels.
+    // Parts and distances in one or more pixels.
     struct Range {
-        uint32_t first = kNothing, last = 0;
+        uint64_t first = UINT64_MAX, last = 0;
         double near = std::numeric_limits<double>::infinity(), far = 0;
-        void add(const Hit& hit) { add(Range{hit.id, hit.id, hit.distance, hit.distance}); }
+        void add(const Hit& hit) { add(Range{hit.part(), hit.part(), hit.distance, hit.distance}); }
         void add(const Range& r) {
             first = std::min(first, r.first);
             last = std::max(last, r.last);
@@ -250,28 +296,73 @@ private:
     std::vector<Range> ranges_;
 };
 
-void render_tile(const Painter& painter, const PanelSettings& s, uint32_t x0, uint32_t y0, PanelImage& image) {
+// The samples of one layer in one tile.
+class Layer {
+public:
+    Layer(const Painter& painter, const PanelSettings& s, uint32_t x0, uint32_t y0, uint32_t x1, uint32_t y1)
+        : painter_(painter), tile_(painter, s, static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0),
+                                   static_cast<int>(y1 - y0)) {}
+
+    void begin_pixel(uint32_t px, uint32_t py) {
+        plain_ = tile_.is_plain(static_cast<int>(px), static_cast<int>(py));
+        painted_ = Hit{}.part();
+    }
+    const Hit& hit(int x, int y) const { return tile_.hit(x, y); }
+    // Of a sample that hit something.
+    dvec3 colour(int x, int y, uint32_t sample, const dvec2& shift) {
+        const Hit& hit = tile_.hit(x, y);
+        const dvec3 direction = painter_.ray(x, y);
+        if (hit.part() != painted_) {
+            paint_ = painter_.paint(hit, painter_.point(hit, direction));
+            painted_ = hit.part();
+        }
+        const double ink = !plain_ && tile_.is_outline(x, y) ? painter_.ink() : 1;
+        return ink * painter_.lit(paint_, hit, direction, sample, shift);
+    }
+
+private:
+    const Painter& painter_;
+    Tile tile_;
+    bool plain_ = false;
+    uint64_t painted_ = 0; // the part that paint_ is of: paint varies too little within a pixel to be asked for again
+    dvec3 paint_{0};
+};
+
+// How much of a surface's own colour is seen if it lets others through: more where it is seen edge-on, as in glass.
+double opacity(const Hit& hit, const dvec3& direction) {
+    if (hit.in_section) return 1;
+    const double edge = 1 - std::abs(glm::dot(hit.normal, direction));
+    return kGlass + (1 - kGlass) * edge * edge * edge;
+}
+
+// `behind` is null, or what is seen through `front`.
+void render_tile(const Painter& front, const Painter* behind, const PanelSettings& s, uint32_t x0, uint32_t y0,
+                 PanelImage& image) {
     const uint32_t x1 = std::min(x0 + kTile, s.width), y1 = std::min(y0 + kTile, s.height);
-    if (painter.is_blank(x0, y0, x1, y1)) return;
-    const Tile tile(painter, s, static_cast<int>(x0), static_cast<int>(y0), static_cast<int>(x1 - x0),
-                    static_cast<int>(y1 - y0));
+    if (front.is_blank(x0, y0, x1, y1) && (!behind || behind->is_blank(x0, y0, x1, y1))) return;
+    Layer layer(front, s, x0, y0, x1, y1);
+    std::optional<Layer> mesh;
+    if (behind) mesh.emplace(*behind, s, x0, y0, x1, y1);
     for (uint32_t py = y0; py < y1; ++py)
         for (uint32_t px = x0; px < x1; ++px) {
-            const bool plain = tile.is_plain(static_cast<int>(px), static_cast<int>(py));
+            layer.begin_pixel(px, py);
+            if (mesh) mesh->begin_pixel(px, py);
             const dvec2 shift = unit_pair(mix(px, py, 2));
             dvec3 sum(0);
             uint32_t covered = 0;
             for (uint32_t i = 0; i < s.grid * s.grid; ++i) {
                 const auto x = static_cast<int>(px * s.grid + i % s.grid),
                            y = static_cast<int>(py * s.grid + i / s.grid);
-                const Hit& hit = tile.hit(x, y);
-                if (hit.id == kNothing) {
-                    sum += painter.paper(painter.ray(x, y), i, shift);
-                    continue;
-                }
-                ++covered;
-                const double ink = !plain && tile.is_outline(x, y) ? kOutlineShade : 1;
-                sum += ink * painter.surface(hit, painter.ray(x, y), i, shift);
+                const Hit& hit = layer.hit(x, y);
+                const double mesh_distance = mesh ? mesh->hit(x, y).distance : HUGE_VAL;
+                const double seen = hit.id == kNothing || mesh_distance < hit.distance ? 0
+                                    : mesh                                             ? opacity(hit, front.ray(x, y))
+                                                                                       : 1;
+                if (seen < 1)
+                    sum += (1 - seen) * (mesh_distance < HUGE_VAL ? mesh->colour(x, y, i, shift)
+                                                                  : front.paper(front.ray(x, y), i, shift));
+                if (seen > 0) sum += seen * layer.colour(x, y, i, shift);
+                covered += seen > 0 || mesh_distance < HUGE_VAL;
             }
             const double samples = s.grid * s.grid;
             const size_t pixel = static_cast<size_t>(py) * s.width + px;
@@ -306,20 +397,22 @@ Camera make_camera(const View& view) {
     return camera;
 }
 
-bool render_panel(const Scene& scene, const std::vector<dvec3>& colours, const PanelSettings& s,
-                  const std::function<bool(double)>& progress, PanelImage& image) {
+bool render_panel(const PanelContent& content, const PanelSettings& s, const std::function<bool(double)>& progress,
+                  PanelImage& image) {
     image.width = s.width;
     image.height = s.height;
     image.colour.assign(static_cast<size_t>(s.width) * s.height, glm::vec3(1));
     image.coverage.assign(image.colour.size(), 0);
-    const Painter painter(scene, colours, s);
+    const Painter front(*content.scene, content, content.mesh, s);
+    std::optional<Painter> behind;
+    if (content.mesh && content.see_through) behind.emplace(*content.mesh, content, nullptr, s);
     const uint32_t across = (s.width + kTile - 1) / kTile, down = (s.height + kTile - 1) / kTile;
     std::mutex reporting;
     uint32_t done = 0;
     std::atomic<bool> stopped = false;
     tbb::parallel_for(0u, across * down, [&](uint32_t tile) {
         if (stopped) return;
-        render_tile(painter, s, tile % across * kTile, tile / across * kTile, image);
+        render_tile(front, behind ? &*behind : nullptr, s, tile % across * kTile, tile / across * kTile, image);
         const std::scoped_lock lock(reporting);
         ++done;
         if (progress && !progress(static_cast<double>(done) / (across * down))) stopped = true;

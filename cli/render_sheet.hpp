@@ -1,17 +1,31 @@
-// A sheet as in the paper's figures 1, 3 and 4: the mesh and the levels of a tree side by side, with captions.
+// A sheet as in the paper's figures 1, 3 and 4: the mesh and the levels of a tree side by side, with captions; or a cut
+// through both, or how far each level sticks out of the mesh.
 #pragma once
 
+#include "cli/render_image.hpp"
 #include "cli/render_panel.hpp"
 
 #include <prolate/error.hpp>
 
-#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 namespace prolate::cli {
+
+/// Where a mesh is drawn.
+enum class MeshStyle : uint8_t {
+    beside,  ///< in a panel of its own, and where a section cuts it, in all panels
+    overlay, ///< within the ellipsoids, which let it be seen
+    hidden,
+};
+
+/// A plane across an axis of the model. What lies on the viewer's side of it is cut away.
+struct SectionPlane {
+    uint32_t axis = 0; ///< 0, 1, 2: x, y, z
+    double at = 0.5;   ///< 0 ... 1: part of the extent of the mesh, or if there is none, of what is shown
+};
 
 struct SheetOptions {
     uint32_t width = 1600, height = 1200; ///< pixels, 96 ... 8192 each
@@ -20,20 +34,17 @@ struct SheetOptions {
     uint32_t samples = 25; ///< a pixel, 16 ... 1024; rounded up to a square number
     uint32_t threads = 0;  ///< at most; 0 = all cores, and never more
     bool floor_shadow = true;
+    MeshStyle mesh_style = MeshStyle::beside;
+    std::optional<SectionPlane> section;
+    /// Colour by how far the cover sticks out of the mesh (Solid::outside_distance), with a legend and figures. Needs a
+    /// mesh, and not as an overlay.
+    bool heat = false;
+    double heat_top = 0;                  ///< end of the legend, percent of the mesh's diagonal; 0 = as the levels need
     std::function<bool(double)> progress; ///< fraction done; return false to cancel
 };
 
-/// An image of 8-bit sRGB pixels, row by row from the top.
-struct Sheet {
-    uint32_t width = 0, height = 0;
-    std::vector<uint8_t> rgb;
-};
-
-/// Renders the sheet: first `mesh` if there is one, then each level's cut. The mesh must be clean. The same input gives
+/// Renders the sheet: `mesh`, if there is one and it is to be seen beside, then each level's cut. The same input gives
 /// the same pixels for any number of threads. Fails with bad_options, cancelled, or io if no font is installed.
-Result<Sheet> render_sheet(const TreeView& tree, std::optional<MeshView> mesh, const SheetOptions& options);
-
-/// The bytes of a PNG file. Fails with internal.
-Result<std::vector<std::byte>> encode_png(const Sheet& sheet);
+Result<Sheet> render_sheet(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& options);
 
 } // namespace prolate::cli

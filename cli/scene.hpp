@@ -1,7 +1,8 @@
-// What a picture shows: the triangles of a mesh or the ellipsoids of one cut, ready for ray tracing with Embree.
+// What a picture shows, ready for ray tracing: the triangles of a mesh (scene_mesh.hpp) or the ellipsoids of one cut of
+// a tree (scene_cut.hpp).
 //
 // Coordinates are moved and scaled by a Frame so that everything shown fits a unit ball around the origin. Tolerances
-// then do not depend on the unit of length, and Embree's single precision is used where it is best.
+// then do not depend on the unit of length, and single precision is used where it is best.
 #pragma once
 
 #include <prolate/mesh.hpp>
@@ -9,15 +10,12 @@
 
 #include <cstdint>
 #include <limits>
-#include <memory>
-#include <vector>
 
-#include <embree3/rtcore.h>
 #include <glm/glm.hpp>
 
 namespace prolate::cli {
 
-/// shown = (model - center) * scale
+/// shown = (model - center) * scale; the center's coordinates are floats.
 struct Frame {
     glm::dvec3 center{0.0};
     double scale = 1;
@@ -47,64 +45,55 @@ struct Window {
     void add(const Window& other);
 };
 
-inline constexpr uint32_t kNothing = ~0u;
+/// The part of a ray that counts, in lengths of its direction.
+struct Reach {
+    double from = 0, to = std::numeric_limits<double>::infinity();
+    bool empty() const { return !(from < to); }
+};
+
+/// What a section keeps: where dot(normal, p) <= offset. The normal is a unit vector.
+struct HalfSpace {
+    glm::dvec3 normal{0.0};
+    double offset = 0;
+    /// The part of a ray in it.
+    Reach clip(const glm::dvec3& origin, const glm::dvec3& direction) const;
+};
+
+inline constexpr uint32_t kNothing = UINT32_MAX;
+inline constexpr uint32_t kMeshId = UINT32_MAX - 1;
 
 /// Where a ray first meets the scene.
 struct Hit {
     double distance = std::numeric_limits<double>::infinity(); ///< in lengths of the ray's direction
-    uint32_t id = kNothing;                                    ///< index of the ellipsoid in the cut; 0 for a mesh
+    uint32_t id = kNothing;                                    ///< the ellipsoid's node, or kMeshId
+    bool in_section = false;                                   ///< within a body, where a section plane cuts it
     glm::dvec3 normal{0.0};                                    ///< unit, towards where the ray came from
+    /// Equal for hits between which no outline is drawn.
+    uint64_t part() const { return uint64_t{id} * 2 + in_section; }
 };
 
-/// Immutable once made; tracing is thread-safe.
+/// What a point is in.
+struct Place {
+    uint32_t id = kNothing; ///< of a body that holds it
+    double clear = 0;       ///< the same holds for all points nearer to it than that
+};
+
+/// Immutable once made; every function is thread-safe.
 class Scene {
 public:
-    /// All triangles, with flat normals. Indices must be in range and coordinates finite (clean() sees to it).
-    Scene(MeshView mesh, const Frame& frame);
-    /// The ellipsoids of `nodes`, in that order.
-    Scene(const TreeView& tree, const std::vector<uint32_t>& nodes, const Frame& frame);
+    virtual ~Scene() = default;
 
-    Hit first_hit(const glm::dvec3& origin, const glm::dvec3& direction) const;
-    bool blocked(const glm::dvec3& origin, const glm::dvec3& direction) const;
+    virtual Hit first_hit(const glm::dvec3& origin, const glm::dvec3& direction, const Reach& reach) const = 0;
+    virtual bool blocked(const glm::dvec3& origin, const glm::dvec3& direction, const Reach& reach) const = 0;
+
+    /// Which body holds the point?
+    virtual Place place_of(const glm::dvec3& p) const = 0;
 
     /// Exact bounds of the image as `camera` sees it. The eye must be outside of every ellipsoid's tangent planes
     /// that contain right or up; an eye twice the unit ball's radius away is.
-    Window window(const Camera& camera) const;
+    virtual Window window(const Camera& camera) const = 0;
     /// Largest value of dot(direction, p) over the scene.
-    double extent(const glm::dvec3& direction) const;
-
-    /// An ellipsoid {c + L u}; L is lower-triangular, and so is its inverse.
-    struct Body {
-        glm::dvec3 center;
-        double l11, l21, l22, l31, l32, l33;
-        double m11, m21, m22, m31, m32, m33;
-        /// transpose(L) n
-        glm::dvec3 transposed(const glm::dvec3& n) const {
-            return {l11 * n.x + l21 * n.y + l31 * n.z, l22 * n.y + l32 * n.z, l33 * n.z};
-        }
-        /// L^-1 p
-        glm::dvec3 whiten(const glm::dvec3& p) const {
-            return {m11 * p.x, m21 * p.x + m22 * p.y, m31 * p.x + m32 * p.y + m33 * p.z};
-        }
-        /// transpose(L^-1) y
-        glm::dvec3 normal(const glm::dvec3& y) const {
-            return {m11 * y.x + m21 * y.y + m31 * y.z, m22 * y.y + m32 * y.z, m33 * y.z};
-        }
-    };
-
-private:
-    struct Release {
-        void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-        void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-    };
-    void open_device();
-    void commit(RTCGeometry geometry);
-
-    std::vector<glm::vec3> vertices_;
-    std::vector<Triangle> triangles_;
-    std::vector<Body> bodies_;
-    std::unique_ptr<RTCDeviceTy, Release> device_; // destroyed after the scene
-    std::unique_ptr<RTCSceneTy, Release> scene_;
+    virtual double extent(const glm::dvec3& direction) const = 0;
 };
 
 } // namespace prolate::cli

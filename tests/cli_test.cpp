@@ -337,6 +337,30 @@ TEST_F(Cli, AnExactTreeThroughEveryCommand) {
     EXPECT_EQ(run({"export", tree, "-o", file("a.csv")}).code, 0);
     EXPECT_EQ(run({"export", tree, "-o", file("a.ply"), "--level", "1"}).code, 0);
     EXPECT_EQ(run({"render", tree, mesh, "-o", file("a.png"), "--size", "400x300", "--samples", "16"}).code, 0);
+    for (const std::vector<std::string>& options :
+         std::vector<std::vector<std::string>>{{"--heat"},
+                                               {"--heat-top", "3", "--mesh", "none"},
+                                               {"--section", "z"},
+                                               {"--mesh", "overlay", "--section", "x,0.3"}}) {
+        std::vector<std::string> words = {"render", tree,      mesh,        "-o", file("b.png"),
+                                          "--size", "400x300", "--samples", "16"};
+        words.insert(words.end(), options.begin(), options.end());
+        EXPECT_EQ(run(words).code, 0) << options[0];
+    }
+    EXPECT_EQ(run({"render", tree, mesh, "-o", file("b.png"), "--section", "w"}).code, 2);
+    EXPECT_EQ(run({
+                      "render",
+                      tree,
+                      mesh,
+                      "-o",
+                      file("b.png"),
+                      "--section",
+                      "z,",
+                  })
+                  .code,
+              2);
+    EXPECT_EQ(run({"render", tree, mesh, "-o", file("b.png"), "--heat", "--mesh", "overlay"}).code, 2);
+    EXPECT_EQ(run({"render", tree, "-o", file("b.png"), "--heat"}).code, 2);
 
     const Json hit = Json::parse(run({"collide", tree, tree, "--pose", "0.5,0,0", "--json"}).out);
     EXPECT_EQ(hit["verdict"], "overlapping");

@@ -1,13 +1,21 @@
-// The picture command: exact silhouettes, inherited hues, reproducible pixels, refused options.
+// The picture command: exact silhouettes and sections, inherited hues, colours that tell distances, reproducible
+// pixels, refused options.
+#include "cli/render_heat.hpp"
 #include "cli/render_palette.hpp"
 #include "cli/render_sheet.hpp"
+#include "cli/scene_cut.hpp"
+#include "cli/scene_mesh.hpp"
+#include "cli/solid.hpp"
 #include "src/format.hpp"
+
+#include <prolate/raycast.hpp>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 namespace {
 
@@ -22,15 +30,17 @@ struct TestNode {
     uint8_t children = 0;
 };
 
-Tree make_tree(const std::vector<std::vector<TestNode>>& levels, uint32_t degree) {
-    const double low[3] = {-4, -4, -4}, high[3] = {4, 4, 4};
+// `shift` moves all along each axis.
+Tree make_tree(const std::vector<std::vector<TestNode>>& levels, uint32_t degree, double shift = 0) {
+    const double low[3] = {shift - 4, shift - 4, shift - 4}, high[3] = {shift + 4, shift + 4, shift + 4};
     const format::Lattice lattice = format::lattice_for(low, high);
     std::vector<format::PackedLevel> packed;
     for (const auto& level : levels) {
         auto& to = packed.emplace_back();
         for (const TestNode& node : level) {
             format::PackedNode n;
-            format::quantise(n, lattice, node.center, node.factor);
+            const double center[3] = {node.center[0] + shift, node.center[1] + shift, node.center[2] + shift};
+            format::quantise(n, lattice, center, node.factor);
             n.child_count = node.children;
             to.nodes.push_back(n);
         }
@@ -43,7 +53,7 @@ Tree make_tree(const std::vector<std::vector<TestNode>>& levels, uint32_t degree
 }
 
 // A root, `degree` children on a circle around it, as many around each of them, and so on.
-Tree nested_circles(uint8_t degree, size_t depth = 3) {
+Tree nested_circles(uint8_t degree, size_t depth = 3, double shift = 0) {
     std::vector<std::vector<TestNode>> levels(depth);
     levels[0].push_back({{0, 0, 0}, {3, 0.5, 2, 0.2, -0.4, 2.5}});
     for (size_t l = 1; l < depth; ++l)
@@ -56,7 +66,54 @@ Tree nested_circles(uint8_t degree, size_t depth = 3) {
                                      {2 * s, 0.3 * s, 1.6 * s, 0.2 * s, 0.5 * s, 1.4 * s}});
             }
         }
-    return make_tree(levels, degree);
+    return make_tree(levels, degree, shift);
+}
+
+// Of the cut of a tree at one level, with all that its scene needs.
+struct Cut {
+    std::vector<uint32_t> nodes;
+    Frame frame;
+    std::vector<float> growth;
+    CutScene scene;
+
+    Cut(const TreeView& tree, uint32_t level) : Cut(tree, level, nodes_of(tree, level)) {}
+
+private:
+    static std::vector<uint32_t> nodes_of(const TreeView& tree, uint32_t level) {
+        std::vector<uint32_t> nodes;
+        tree.for_each_in_cut(level, [&](uint32_t node) { nodes.push_back(node); });
+        return nodes;
+    }
+    static Frame frame_of(const TreeView& tree, const std::vector<uint32_t>& nodes) {
+        Box box;
+        for (const uint32_t node : nodes) box.add(tree.ellipsoid(node));
+        return box.frame();
+    }
+    static std::vector<float> growth_of(const TreeView& tree) {
+        std::vector<float> growth(tree.slot_count());
+        node_growth(tree, growth);
+        return growth;
+    }
+    Cut(const TreeView& tree, uint32_t level, std::vector<uint32_t> of)
+        : nodes(std::move(of)), frame(frame_of(tree, nodes)), growth(growth_of(tree)),
+          scene(tree, level, growth, frame) {}
+};
+
+Paint grey() {
+    return [](const Hit&, const dvec3&) { return dvec3(0.5); };
+}
+
+CleanMesh cleaned(const Mesh& mesh) {
+    return *clean(mesh.view());
+}
+
+Mesh box_mesh(float half) {
+    Mesh mesh;
+    for (unsigned i = 0; i < 8; ++i)
+        mesh.vertices.push_back({i & 1 ? half : -half, i & 2 ? half : -half, i & 4 ? half : -half});
+    mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                      {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    return mesh;
 }
 
 // Whether the ray meets the ellipsoid, from the shape matrix alone: with o = eye - center, the quadratic form Q^-1 must
@@ -90,23 +147,17 @@ TEST(Render, SilhouetteIsTheEllipsoids) {
         TestNode root = sphere;
         root.children = static_cast<uint8_t>(shapes.size());
         const Tree tree = make_tree({{root}, shapes}, 3);
+        const Cut cut(tree.view(), 1);
         std::vector<Ellipsoid> ellipsoids;
-        std::vector<uint32_t> nodes;
-        Box box;
-        tree.view().for_each_node(1, [&](uint32_t node) {
-            nodes.push_back(node);
-            box.add(ellipsoids.emplace_back(tree.view().ellipsoid(node)));
-        });
-        const Frame frame = box.frame();
-        const Scene scene(tree.view(), nodes, frame);
+        for (const uint32_t node : cut.nodes) ellipsoids.push_back(tree.view().ellipsoid(node));
         for (const View& view : {View{30, 18, UpAxis::y}, View{-100, -40, UpAxis::z}, View{200, 70, UpAxis::minus_x}}) {
             PanelSettings s = settings_for(view);
-            const Window tight = scene.window(s.camera);
+            const Window tight = cut.scene.window(s.camera);
             const double du = tight.u1 - tight.u0, dv = tight.v1 - tight.v0;
             s.window = {tight.u0 - 0.1 * du, tight.u1 + 0.1 * du, tight.v0 - 0.1 * dv, tight.v1 + 0.1 * dv};
             PanelImage image;
             s.floor_shadow = view.elevation > 0;
-            ASSERT_TRUE(render_panel(scene, std::vector(nodes.size(), dvec3(0.5)), s, nullptr, image));
+            ASSERT_TRUE(render_panel({.scene = &cut.scene, .paint = grey()}, s, nullptr, image));
 
             constexpr int kFine = 12;
             int inside = 0, outside = 0, partial = 0;
@@ -119,8 +170,9 @@ TEST(Render, SilhouetteIsTheEllipsoids) {
                             const double py = (y + double(j) / kFine) / s.height;
                             const double u = s.window.u0 + px * (s.window.u1 - s.window.u0);
                             const double v = s.window.v1 - py * (s.window.v1 - s.window.v0);
-                            hits += std::any_of(ellipsoids.begin(), ellipsoids.end(),
-                                                [&](const Ellipsoid& e) { return meets(e, frame, s.camera, u, v); });
+                            hits += std::any_of(ellipsoids.begin(), ellipsoids.end(), [&](const Ellipsoid& e) {
+                                return meets(e, cut.frame, s.camera, u, v);
+                            });
                         }
                     const double truth = hits / double((kFine + 1) * (kFine + 1));
                     const double seen = image.coverage[size_t{s.width} * y + x];
@@ -142,14 +194,212 @@ TEST(Render, SilhouetteIsTheEllipsoids) {
     }
 }
 
+// Rays, shadows and points of the runtime's cut, against all of its ellipsoids one by one; also far from the origin.
+TEST(Render, CutsAreTracedAsTheirEllipsoids) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> normal;
+    const auto any_point = [&] { return dvec3(normal(random), normal(random), normal(random)); };
+    int met = 0, missed = 0, held = 0, shared = 0;
+    for (const double shift : {0.0, 5000.0}) {
+        const Tree tree = nested_circles(12, 4, shift);
+        for (const uint32_t level : {0u, 2u, 3u}) {
+            const Cut cut(tree.view(), level);
+            for (int n = 0; n < 400; ++n) {
+                const dvec3 origin = 2.0 * glm::normalize(any_point()), target = 0.4 * any_point();
+                const dvec3 direction = glm::normalize(target - origin);
+                double first = HUGE_VAL, least = 1;
+                uint32_t deepest = kNothing;
+                int holders = 0;
+                for (const uint32_t node : cut.nodes) {
+                    const Ellipsoid e = tree.view().ellipsoid(node);
+                    const dmat3 factor(e.l11, e.l21, e.l31, 0, e.l22, e.l32, 0, 0, e.l33); // column by column
+                    const dmat3 to_ball = glm::inverse(cut.frame.scale * factor);
+                    const dvec3 c = cut.frame(e.center);
+                    const dvec3 o = to_ball * (origin - c), d = to_ball * direction, p = to_ball * (target - c);
+                    const double od = glm::dot(o, d), dd = glm::dot(d, d);
+                    const double root = std::sqrt(od * od - dd * (glm::dot(o, o) - 1)); // NaN: no hit
+                    if (const double t = (-od - root) / dd; t > 0) first = std::min(first, t);
+                    if (glm::dot(p, p) < least) least = glm::dot(p, p), deepest = node;
+                    holders += glm::dot(p, p) < 1;
+                }
+                const Hit hit = cut.scene.first_hit(origin, direction, {});
+                ASSERT_EQ(hit.id != kNothing, first < HUGE_VAL);
+                ASSERT_EQ(cut.scene.blocked(origin, direction, {}), first < HUGE_VAL);
+                ASSERT_EQ(cut.scene.place_of(target).id, deepest);
+                ++(first < HUGE_VAL ? met : missed);
+                held += deepest != kNothing, shared += holders > 1;
+                if (first == HUGE_VAL) continue;
+                ASSERT_NEAR(hit.distance, first, 2e-3); // where it grazes
+                ASSERT_LT(glm::dot(hit.normal, direction), 1e-6);
+                // What lies before a part of the ray, or behind it, does not count.
+                ASSERT_FALSE(cut.scene.blocked(origin, direction, {0, first - 1e-2}));
+                ASSERT_GE(cut.scene.first_hit(origin, direction, {first + 1e-4, HUGE_VAL}).distance, first);
+            }
+        }
+    }
+    EXPECT_GT(met, 500);
+    EXPECT_GT(missed, 300);
+    EXPECT_GT(held, 300);
+    EXPECT_GT(shared, 20);
+}
+
+// A camera on the z-axis looks at a section across it: every pixel is the colour of what the plane cuts there.
+TEST(Render, SectionsShowWhatThePlaneCuts) {
+    std::vector<TestNode> balls = {{{-0.6, 0, 0.1}, {1.4, 0, 1.4, 0, 0, 1.4}},
+                                   {{0.9, 0.3, -0.2}, {1.2, 0.2, 1, 0.1, 0.3, 1.1}},
+                                   {{0, -1, 0}, {0.8, 0.1, 1.2, 0, 0, 0.9}}};
+    const Tree tree = make_tree({{{{0, 0, 0}, {3, 0, 3, 0, 0, 3}, 3}}, balls}, 3);
+    const Cut cut(tree.view(), 1);
+    const Mesh mesh = box_mesh(0.5f);
+    const Solid solid(mesh.view(), true);
+    const MeshScene mesh_scene(mesh.view(), cut.frame, &solid);
+    const std::vector<dvec3> colours = {{0.9, 0.1, 0.1}, {0.1, 0.8, 0.2}, {0.2, 0.1, 0.7}};
+    const dvec3 mesh_colour(0.25, 0.5, 0.75);
+    const Paint paint = [&](const Hit& hit, const dvec3&) {
+        return hit.id == kMeshId ? mesh_colour
+                                 : colours[std::find(cut.nodes.begin(), cut.nodes.end(), hit.id) - cut.nodes.begin()];
+    };
+    PanelSettings s = settings_for({0, 0, UpAxis::y});
+    const double height = 0.1; // of the plane, in the model
+    s.section = HalfSpace{{0, 0, 1}, (height - cut.frame.center.z) * cut.frame.scale};
+    s.window = {-0.2, 0.2, -0.15, 0.15};
+    s.floor_shadow = false;
+    PanelImage image;
+    ASSERT_TRUE(render_panel({.scene = &cut.scene, .paint = paint, .mesh = &mesh_scene}, s, nullptr, image));
+    const auto at_plane = [&](double x, double y) { // of the picture, in pixels: what the plane shows there
+        const double u = s.window.u0 + x / s.width * (s.window.u1 - s.window.u0);
+        const double v = s.window.v1 - y / s.height * (s.window.v1 - s.window.v0);
+        const dvec3 d = s.camera.direction(u, v);
+        const dvec3 shown = s.camera.eye + (s.section->offset - s.camera.eye.z) / d.z * d;
+        const dvec3 p = shown / cut.frame.scale + cut.frame.center;
+        if (std::max(std::abs(p.x), std::abs(p.y)) < 0.5) return kMeshId;
+        double least = 1;
+        uint32_t deepest = kNothing;
+        for (const uint32_t node : cut.nodes) {
+            const Ellipsoid e = tree.view().ellipsoid(node);
+            const dmat3 factor(e.l11, e.l21, e.l31, 0, e.l22, e.l32, 0, 0, e.l33);
+            const dvec3 w = glm::inverse(factor) * (p - dvec3(e.center.x, e.center.y, e.center.z));
+            if (glm::dot(w, w) < least) least = glm::dot(w, w), deepest = node;
+        }
+        return deepest;
+    };
+    int seen[5] = {};
+    for (uint32_t y = 0; y < s.height; ++y)
+        for (uint32_t x = 0; x < s.width; ++x) {
+            const uint32_t id = at_plane(x + 0.5, y + 0.5);
+            bool plain = true; // nothing else near, whose outline may be drawn here
+            for (int i = -3; i <= 3; ++i)
+                for (int j = -3; j <= 3; ++j) plain = plain && at_plane(x + 0.5 + i, y + 0.5 + j) == id;
+            if (!plain) continue;
+            const glm::vec3 colour = image.colour[size_t{s.width} * y + x];
+            if (id == kNothing) {
+                // The ellipsoids are widest near the plane, so behind it nothing of them is seen at any distance from
+                // it.
+                seen[4] += image.coverage[size_t{s.width} * y + x] == 0;
+                continue;
+            }
+            Hit hit;
+            hit.id = id;
+            ASSERT_LT(glm::distance(dvec3(colour), paint(hit, {})), 1e-5) << x << "," << y;
+            ++seen[id == kMeshId ? 3 : std::find(cut.nodes.begin(), cut.nodes.end(), id) - cut.nodes.begin()];
+        }
+    for (const int count : seen) EXPECT_GT(count, 100);
+}
+
+// What is kept of a ray, against the plane itself.
+TEST(Render, SectionsClipRays) {
+    std::mt19937 random(2);
+    std::normal_distribution<double> normal;
+    const auto any_point = [&] { return dvec3(normal(random), normal(random), normal(random)); };
+    int empty = 0, from_outside = 0, to_outside = 0;
+    for (int n = 0; n < 1000; ++n) {
+        const HalfSpace half{glm::normalize(any_point()), normal(random)};
+        const dvec3 o = any_point(), d = any_point();
+        const Reach reach = half.clip(o, d);
+        empty += reach.empty(), from_outside += reach.from > 0, to_outside += !reach.empty() && reach.to < HUGE_VAL;
+        for (const double t : {0.0, 0.3, 1.0, 5.0, 100.0}) {
+            const double excess = glm::dot(half.normal, o + t * d) - half.offset;
+            if (std::abs(excess) < 1e-9) continue;
+            ASSERT_EQ(t >= reach.from && t <= reach.to && !reach.empty(), excess < 0);
+        }
+    }
+    EXPECT_GT(empty, 100);
+    EXPECT_GT(from_outside, 100);
+    EXPECT_GT(to_outside, 100);
+}
+
+// A blue ball around a green box: the box is seen through it, and the paper too.
+TEST(Render, OverlaysLetTheMeshBeSeen) {
+    const Tree tree = make_tree({{{{0, 0, 0}, {2, 0, 2, 0, 0, 2}}}}, 2);
+    const Cut cut(tree.view(), 0);
+    const Mesh mesh = box_mesh(0.7f);
+    const MeshScene mesh_scene(mesh.view(), cut.frame);
+    const Paint paint = [](const Hit& hit, const dvec3&) {
+        return hit.id == kMeshId ? dvec3(0, 1, 0) : dvec3(0, 0, 1);
+    };
+    PanelSettings s = settings_for({30, 20, UpAxis::y});
+    s.window = {-0.2, 0.2, -0.15, 0.15};
+    s.floor_shadow = false;
+    PanelContent content{.scene = &cut.scene, .paint = paint, .mesh = &mesh_scene, .see_through = true};
+    PanelImage overlay, solid, alone;
+    ASSERT_TRUE(render_panel(content, s, nullptr, overlay));
+    content.see_through = false;
+    ASSERT_TRUE(render_panel(content, s, nullptr, solid));
+    content = {.scene = &mesh_scene, .paint = paint};
+    ASSERT_TRUE(render_panel(content, s, nullptr, alone));
+    EXPECT_EQ(overlay.coverage, solid.coverage);
+    int inside = 0, around = 0;
+    for (size_t i = 0; i < overlay.colour.size(); ++i) {
+        if (solid.coverage[i] < 1) continue;
+        ASSERT_LT(solid.colour[i].g, 0.15f); // gloss
+        if (alone.coverage[i] == 1) {
+            ++inside;
+            ASSERT_LT(overlay.colour[i].r, 0.15f);
+            ASSERT_GT(overlay.colour[i].g, 0.3f * alone.colour[i].g);
+            ASSERT_LT(overlay.colour[i].g, alone.colour[i].g);
+        } else if (alone.coverage[i] == 0) {
+            ++around;
+            ASSERT_GE(overlay.colour[i].r, solid.colour[i].r - 0.01f); // of the paper
+        }
+    }
+    EXPECT_GT(inside, 300);
+    EXPECT_GT(around, 300);
+}
+
+TEST(Render, SolidsTellDistances) {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> range(-2, 2);
+    Mesh open = box_mesh(1);
+    const Solid solid(open.view(), true);
+    open.triangles.erase(open.triangles.begin(), open.triangles.begin() + 2);
+    const Solid without_a_side(open.view(), false);
+    int inside = 0;
+    for (int n = 0; n < 1000; ++n) {
+        const dvec3 p(range(random), range(random), range(random));
+        const dvec3 beyond = glm::max(glm::abs(p) - 1.0, 0.0);
+        ASSERT_NEAR(solid.outside_distance(p), glm::length(beyond), 1e-6);
+        ASSERT_EQ(solid.holds(p), glm::length(beyond) == 0);
+        inside += solid.holds(p);
+        if (p.z > 0.2 && glm::length(beyond) == 0) { // far from the hole
+            ASSERT_TRUE(without_a_side.holds(p));
+        }
+    }
+    EXPECT_GT(inside, 50);
+    EXPECT_NEAR(solid.diagonal(), std::sqrt(12.0), 1e-6);
+    // A ball of radius 2 around the box: farthest beyond the middles of its sides.
+    const Solid::Closeness close = solid.closeness(std::vector<Ellipsoid>{{{0, 0, 0}, 2, 0, 2, 0, 0, 2}});
+    EXPECT_NEAR(close.max, 1, 0.01);
+    EXPECT_GT(close.mean, 2 - std::sqrt(3));
+    EXPECT_LT(close.mean, 1);
+}
+
 TEST(Render, WindowTouchesTheSilhouette) {
     const Tree tree = make_tree({{{{0.3, -0.2, 0.5}, {2, 0.7, 0.5, -0.3, 0.8, 1}}}}, 2);
     const Ellipsoid e = tree.view().ellipsoid(0);
-    Box box;
-    box.add(e);
-    const Frame frame = box.frame();
+    const Cut cut(tree.view(), 0);
+    const Frame& frame = cut.frame;
     const Camera camera = make_camera({40, 25, UpAxis::y});
-    const Window w = Scene(tree.view(), {0}, frame).window(camera);
+    const Window w = cut.scene.window(camera);
     // No ray beyond an edge meets the ellipsoid, and some ray just within it does.
     const auto any_in_column = [&](double u) {
         bool any = false;
@@ -231,6 +481,28 @@ TEST(Render, PaletteMatchesKnownValues) {
     EXPECT_LT(got.chroma, 0.3);
 }
 
+TEST(Render, HeatRisesInEvenSteps) {
+    double before = 0, least = 1, most = 0;
+    for (int i = 0; i <= 20; ++i) {
+        const double lightness = to_oklch(heat_colour(i / 20.0)).lightness;
+        if (i > 0) least = std::min(least, lightness - before), most = std::max(most, lightness - before);
+        before = lightness;
+    }
+    EXPECT_GT(least, 0.02); // always lighter, so that it can be read in grey, ...
+    EXPECT_LT(most, 2 * least);
+    EXPECT_EQ(heat_colour(-1), heat_colour(0)); // ... and ends at the ends
+    EXPECT_EQ(heat_colour(2), heat_colour(1));
+    for (const double percent : {0.003, 0.9, 1.0, 1.1, 7.2, 9.9, 120.0}) {
+        const double top = HeatScale::round_up(percent);
+        EXPECT_GE(top, percent);
+        EXPECT_LE(top, 1.6 * percent);
+        const HeatScale scale{top, false};
+        EXPECT_EQ(scale.share(0), 0);
+        EXPECT_EQ(scale.share(top), 1);
+        EXPECT_LT(scale.share(top / 3), scale.share(top / 2));
+    }
+}
+
 SheetOptions small_sheet() {
     SheetOptions o;
     o.width = 320;
@@ -246,12 +518,14 @@ Mesh tetrahedron() {
 
 TEST(Render, SameBytesForAnyNumberOfThreads) {
     const Tree tree = nested_circles(6);
-    const Mesh mesh = tetrahedron();
+    const CleanMesh mesh = cleaned(tetrahedron());
     std::vector<std::byte> first;
     for (const uint32_t threads : {1u, 2u, 4u, 1u}) {
         SheetOptions o = small_sheet();
         o.threads = threads;
-        const auto sheet = render_sheet(tree.view(), mesh.view(), o);
+        o.heat = true;
+        o.section = SectionPlane{};
+        const auto sheet = render_sheet(tree.view(), &mesh, o);
         ASSERT_TRUE(sheet) << sheet.error().what;
         EXPECT_EQ(sheet->rgb.size(), size_t{3} * o.width * o.height);
         const auto png = encode_png(*sheet);
@@ -265,6 +539,67 @@ TEST(Render, SameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(static_cast<char>(first[3]), 'G');
 }
 
+// Of the pixels that are not grey, how many have the hue that belongs to a distance, and is there a legend?
+TEST(Render, HeatTellsTheDistance) {
+    const double radius = 1.5;
+    const Tree tree = make_tree({{{{0, 0, 0}, {radius, 0, radius, 0, 0, radius}}}}, 2);
+    Mesh ball; // of radius 1: a fine grid on a sphere
+    constexpr int kRings = 30, kAround = 60;
+    for (int i = 0; i <= kRings; ++i)
+        for (int j = 0; j < kAround; ++j) {
+            const double a = std::numbers::pi * i / kRings, b = 2 * std::numbers::pi * j / kAround;
+            ball.vertices.push_back({static_cast<float>(std::sin(a) * std::cos(b)),
+                                     static_cast<float>(std::sin(a) * std::sin(b)), static_cast<float>(std::cos(a))});
+        }
+    for (uint32_t i = 0; i < kRings; ++i)
+        for (uint32_t j = 0; j < kAround; ++j) {
+            const uint32_t a = i * kAround + j, b = i * kAround + (j + 1) % kAround;
+            ball.triangles.push_back({a, a + kAround, b});
+            ball.triangles.push_back({b, a + kAround, b + kAround});
+        }
+    const CleanMesh mesh = cleaned(ball);
+    const double percent = 100 * (radius - 1) / std::sqrt(12.0);
+    for (const double top : {0.0, 4 * percent}) {
+        SheetOptions o = small_sheet();
+        o.levels = {0};
+        o.heat = true;
+        o.heat_top = top;
+        o.mesh_style = MeshStyle::hidden;
+        const auto sheet = render_sheet(tree.view(), &mesh, o);
+        ASSERT_TRUE(sheet) << sheet.error().what;
+        const HeatScale scale{top > 0 ? top : HeatScale::round_up(percent), false};
+        const auto pixel = [&](uint32_t x, uint32_t y) {
+            const uint8_t* const p = &sheet->rgb[(size_t{o.width} * y + x) * 3];
+            return dvec3(srgb_decode(p[0] / 255.0), srgb_decode(p[1] / 255.0), srgb_decode(p[2] / 255.0));
+        };
+        // Light scales a colour, and gloss adds grey.
+        const auto has_colour = [](const dvec3& seen, const dvec3& c) {
+            const dvec3 differences(seen.x - seen.y, seen.y - seen.z, seen.z - seen.x),
+                of(c.x - c.y, c.y - c.z, c.z - c.x);
+            return glm::length(differences) > 0.02 && glm::dot(glm::normalize(differences), glm::normalize(of)) > 0.999;
+        };
+        uint32_t legend = 0;
+        int right = 0, wrong = 0;
+        const dvec3 expected = scale.colour(percent);
+        for (uint32_t y = 0; y < o.height; ++y) {
+            double lightest = -1;
+            int rising = 0;
+            for (uint32_t x = 0; x < o.width; ++x) {
+                const dvec3 c = pixel(x, y);
+                const Oklch lch = to_oklch(c);
+                if (lch.chroma > 0.04 && lch.lightness > lightest) lightest = lch.lightness, ++rising;
+            }
+            if (rising > 60) legend = legend > 0 ? legend : y;
+            if (legend > 0) continue;
+            for (uint32_t x = 0; x < o.width; ++x)
+                if (to_oklch(pixel(x, y)).chroma > 0.04) ++(has_colour(pixel(x, y), expected) ? right : wrong);
+        }
+        EXPECT_GT(legend, o.height / 2);
+        EXPECT_GT(right, 3000);
+        EXPECT_LT(wrong, right / 50);
+    }
+}
+
 // Nothing may be cut off: the outermost pixels are paper, whatever the shape and the view.
 TEST(Render, SheetBorderIsPaper) {
     const Tree tree = nested_circles(5);
@@ -274,7 +609,7 @@ TEST(Render, SheetBorderIsPaper) {
         if (view.up == UpAxis::z) o.width = 100; // the floor shadow reaches beyond a narrow picture
         o.levels = {0};
         o.view = view;
-        const auto sheet = render_sheet(tree.view(), std::nullopt, o);
+        const auto sheet = render_sheet(tree.view(), nullptr, o);
         ASSERT_TRUE(sheet) << sheet.error().what;
         int ink = 0;
         for (uint32_t y = 0; y < o.height; ++y)
@@ -293,7 +628,7 @@ TEST(Render, RefusesBadOptions) {
     const auto code = [&tree](auto change) {
         SheetOptions o = small_sheet();
         change(o);
-        const auto sheet = render_sheet(tree.view(), std::nullopt, o);
+        const auto sheet = render_sheet(tree.view(), nullptr, o);
         return sheet ? ErrorCode{} : sheet.error().code;
     };
     EXPECT_EQ(code([](SheetOptions&) {}), ErrorCode{});
@@ -311,6 +646,16 @@ TEST(Render, RefusesBadOptions) {
                   o.levels = {0, 1, 2, 0, 1, 2};
               }),
               ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& o) { o.heat = true; }), ErrorCode::bad_options); // no mesh
+    EXPECT_EQ(code([](SheetOptions& o) { o.mesh_style = MeshStyle::overlay; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& o) { o.heat_top = -1; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& o) { o.section = {3, 0.5}; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& o) { o.section = {0, 1.5}; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& o) { o.section = {0, NAN}; }), ErrorCode::bad_options);
+    SheetOptions both = small_sheet();
+    both.heat = true, both.mesh_style = MeshStyle::overlay;
+    const CleanMesh mesh = cleaned(tetrahedron());
+    EXPECT_EQ(render_sheet(tree.view(), &mesh, both).error().code, ErrorCode::bad_options);
     EXPECT_EQ(code([](SheetOptions& o) { o.progress = [](double) { return false; }; }), ErrorCode::cancelled);
 }
 
