@@ -26,6 +26,8 @@ namespace {
 // What a plain list takes: center and radius, center and factor, corners; four bytes a number.
 constexpr size_t kSphereBytes = 16, kEllipsoidBytes = 36, kCornerBytes = 12;
 
+constexpr const char* kPublishedHulls = "V-HACD hulls (published)";
+
 struct Arguments {
     std::vector<std::string> meshes, peer_names{"V-HACD"};
     std::vector<uint32_t> counts{8, 16, 32, 64, 128, 256, 512}, peer_counts{8, 32, 128};
@@ -51,11 +53,12 @@ void print(const Row& r) {
 
 std::string csv_of(const std::vector<Row>& rows, const std::string& quality) {
     std::string out = "model,made_of,quality,asked,count,bytes,file_bytes,outside_ratio,hausdorff_percent,uncovered\n";
+    const auto known = [](double x) { return std::isnan(x) ? "" : fmt::format("{:.6f}", x); };
+    const auto bytes = [](size_t n) { return n ? fmt::format("{}", n) : ""; };
     for (const Row& r : rows)
-        out +=
-            fmt::format("{},{},{},{},{},{},{},{:.6f},{:.5f},{:.6f}\n", r.model, r.made_of, r.file_bytes ? quality : "",
-                        r.asked, r.count, r.bytes, r.file_bytes ? fmt::format("{}", r.file_bytes) : "", r.outside_ratio,
-                        r.hausdorff, r.uncovered);
+        out += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", r.model, r.made_of, r.file_bytes ? quality : "", r.asked,
+                           r.count, bytes(r.bytes), bytes(r.file_bytes), known(r.outside_ratio), known(r.hausdorff),
+                           known(r.uncovered));
     return out;
 }
 
@@ -84,7 +87,7 @@ void add_published(const Model& model, std::vector<Row>& rows) {
         for (const Published& p : all_published()) {
             const double ratio = hulls ? p.vhacd : p.amaa;
             if (p.model != model.name || p.triangles != model.mesh.triangles.size() || std::isnan(ratio)) continue;
-            Row row{model.name, hulls ? "V-HACD hulls, published" : "AMAA spheres, published", p.count, p.count};
+            Row row{model.name, hulls ? kPublishedHulls : "AMAA spheres (published)", p.count, p.count};
             if (!hulls) row.bytes = p.count * kSphereBytes;
             row.outside_ratio = ratio, row.uncovered = kUnknown;
             print(rows.emplace_back(row));
@@ -119,6 +122,7 @@ void add_peers(const Model& model, const Arguments& a, std::vector<Row>& rows) {
 
 // What a legend says of one kind: hulls that leave much of the solid out are no cover.
 std::string label_of(const std::string& kind, const std::vector<Row>& rows) {
+    if (kind == kPublishedHulls) return kind + ": no cover, they leave part of the solid out";
     double most = 0;
     for (const Row& r : rows)
         if (r.made_of == kind) most = std::max(most, r.uncovered);

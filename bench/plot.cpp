@@ -43,18 +43,23 @@ std::string plain(int digit, int exponent) {
     return digits;
 }
 
-std::string marker(size_t which, double x, double y) {
-    const char* const colour = kColours[which];
+// A hollow one is larger: it may lie on another.
+std::string marker(size_t which, double x, double y, bool hollow) {
+    const double r = hollow ? 7 : 4;
+    const std::string look = hollow ? fmt::format("fill=\"none\" stroke=\"{}\" stroke-width=\"2\"", kColours[which])
+                                    : fmt::format("fill=\"{}\"", kColours[which]);
     switch (which % 4) {
     case 0:
-        return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4\" fill=\"{}\"/>\n", x, y, colour);
+        return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"{}\" {}/>\n", x, y, r, look);
     case 1:
-        return fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"8\" height=\"8\" fill=\"{}\"/>\n", x - 4, y - 4,
-                           colour);
+        return fmt::format("<rect x=\"{0:.1f}\" y=\"{1:.1f}\" width=\"{2}\" height=\"{2}\" {3}/>\n", x - r, y - r,
+                           2 * r, look);
     case 2:
-        return fmt::format("<path d=\"M{:.1f} {:.1f}l5 9h-10z\" fill=\"{}\"/>\n", x, y - 5.5, colour);
+        return fmt::format("<path d=\"M{:.1f} {:.1f}l{} {}h{}z\" {}/>\n", x, y - 1.4 * r, 1.25 * r, 2.25 * r, -2.5 * r,
+                           look);
     default:
-        return fmt::format("<path d=\"M{:.1f} {:.1f}l5 5l-5 5l-5 -5z\" fill=\"{}\"/>\n", x, y - 5, colour);
+        return fmt::format("<path d=\"M{0:.1f} {1:.1f}l{2} {2}l-{2} {2}l-{2} -{2}z\" {3}/>\n", x, y - 1.25 * r,
+                           1.25 * r, look);
     }
 }
 
@@ -77,8 +82,8 @@ struct Range {
     }
 };
 
-// Lines at 1, 2 and 5 times each power of ten, short strokes at the others. Where there are many decades, only powers
-// have labels.
+// Lines at 1, 2 and 5 times each power of ten, where there are many decades at powers alone; short strokes at the
+// others.
 std::string ticks(const Axis& x, const Axis& y) {
     std::string out;
     const auto along = [](const Axis& axis, const auto& draw) {
@@ -86,20 +91,20 @@ std::string ticks(const Axis& x, const Axis& y) {
             for (int digit = 1; digit < 10; ++digit) {
                 const double value = digit * std::pow(10, e), at = std::log10(value);
                 if (at < axis.low - 1e-9 || at > axis.high + 1e-9) continue;
-                const bool roomy = axis.high - axis.low < 2.6 && value < 1000; // long numbers would touch
-                const bool labelled = digit == 1 || (roomy && (digit == 2 || digit == 5));
-                draw(axis(value), labelled ? plain(digit, e) : "");
+                const bool line = digit == 1 || (axis.high - axis.low < 2.6 && (digit == 2 || digit == 5));
+                const bool labelled = line && (digit == 1 || value < 1000); // long numbers would touch
+                draw(axis(value), line, labelled ? plain(digit, e) : "");
             }
     };
-    along(x, [&](double at, const std::string& label) {
-        if (label.empty())
+    along(x, [&](double at, bool line, const std::string& label) {
+        if (!line)
             out += fmt::format("<path d=\"M{:.1f} {:.1f}v-4\" stroke=\"#444\"/>\n", at, y.from);
         else
             out += fmt::format("<path d=\"M{0:.1f} {1:.1f}V{2:.1f}\" stroke=\"#ddd\"/>\n", at, y.from, y.to) +
                    words(at, y.from + 18, "middle", label);
     });
-    along(y, [&](double at, const std::string& label) {
-        if (label.empty())
+    along(y, [&](double at, bool line, const std::string& label) {
+        if (!line)
             out += fmt::format("<path d=\"M{:.1f} {:.1f}h4\" stroke=\"#444\"/>\n", x.from, at);
         else
             out += fmt::format("<path d=\"M{0:.1f} {1:.1f}H{2:.1f}\" stroke=\"#ddd\"/>\n", x.from, at, x.to) +
@@ -110,11 +115,12 @@ std::string ticks(const Axis& x, const Axis& y) {
 
 std::string curve(const Series& s, size_t which, const Axis& x, const Axis& y) {
     std::string path, markers;
+    const bool alone = s.points.size() == 1;
     for (const auto& [px, py] : s.points) {
         path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", x(px), y(py));
-        markers += marker(which, x(px), y(py));
+        markers += marker(which, x(px), y(py), alone);
     }
-    if (s.points.size() > 1)
+    if (!alone)
         path = fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>\n", path, kColours[which]);
     else
         path.clear();
@@ -125,12 +131,14 @@ std::string curve(const Series& s, size_t which, const Axis& x, const Axis& y) {
 
 std::string log_log_plot(const std::string& title, const std::string& x_label, const std::vector<Panel>& panels,
                          const PlotOptions& options) {
-    std::map<std::string, Range> x_ranges;
+    std::map<std::string, Range> x_ranges, y_ranges;
     std::vector<std::string> labels;
+    std::map<std::string, bool> curved; // which labels are those of curves, and not of single points alone
     for (const Panel& panel : panels)
         for (const Series& s : panel.series) {
             if (std::ranges::find(labels, s.label) == labels.end()) labels.push_back(s.label);
-            for (const auto& p : s.points) x_ranges[panel.x_label].add(p.first);
+            curved[s.label] |= s.points.size() > 1;
+            for (const auto& p : s.points) x_ranges[panel.x_label].add(p.first), y_ranges[panel.y_label].add(p.second);
         }
     const auto style = [&labels](const Series& s) {
         return static_cast<size_t>(std::ranges::find(labels, s.label) - labels.begin()) % kColours.size();
@@ -148,11 +156,8 @@ std::string log_log_plot(const std::string& title, const std::string& x_label, c
     out += words(width / 2, 24, "middle", title, " font-size=\"16\"");
     for (size_t at = 0; at < panels.size(); ++at) {
         const Panel& panel = panels[at];
-        Range y_range;
-        for (const Series& s : panel.series)
-            for (const auto& p : s.points) y_range.add(p.second);
         const auto [x0, x1] = x_ranges[panel.x_label].limits();
-        const auto [y0, y1] = y_range.limits();
+        const auto [y0, y1] = y_ranges[panel.y_label].limits();
         const size_t row = at / columns, column = at % columns;
         const double left = static_cast<double>(column) * (kWide + kLeft) + kLeft;
         const double top = kHead + static_cast<double>(row) * (kTop + kHigh + kBelow) + kTop;
@@ -176,8 +181,10 @@ std::string log_log_plot(const std::string& title, const std::string& x_label, c
     double y = legend + kLegendLine - 4;
     for (size_t k = 0; k < labels.size(); ++k, y += kLegendLine) {
         const size_t which = k % kColours.size();
-        out += fmt::format("<path d=\"M{0:.1f} {1:.1f}h30\" stroke=\"{2}\" stroke-width=\"2\"/>\n{3}", kLeft, y,
-                           kColours[which], marker(which, kLeft + 15, y));
+        if (curved[labels[k]])
+            out += fmt::format("<path d=\"M{:.1f} {:.1f}h30\" stroke=\"{}\" stroke-width=\"2\"/>\n", kLeft, y,
+                               kColours[which]);
+        out += marker(which, kLeft + 15, y, !curved[labels[k]]);
         out += words(kLeft + 40, y + 4, "start", labels[k]);
     }
     if (options.slope_of_one) {

@@ -12,8 +12,8 @@ struct Series {
     std::vector<std::pair<double, double>> points; ///< x and y, both above 0
 };
 
-/// One pair of axes. Panels of the same x label share their range of x, and a label has the same colour and marker in
-/// all.
+/// One pair of axes. Panels of the same label share their range of x, or of y, and a series' label has the same colour
+/// and marker in all.
 struct Panel {
     std::string title, y_label;
     std::vector<Series> series;
@@ -27,7 +27,7 @@ struct PlotOptions {
 
 /// The text of an SVG file, with one legend below all panels. White ground, the colours of Okabe and Ito (told apart by
 /// the colour-blind, too), and a marker of its own for each series. At most eight series. A series of one point is a
-/// marker alone.
+/// hollow marker.
 std::string log_log_plot(const std::string& title, const std::string& x_label, const std::vector<Panel>& panels,
                          const PlotOptions& options = {});
 
