@@ -17,37 +17,44 @@ namespace {
 using glm::dvec3;
 
 constexpr uint32_t kWidth = 400, kHeight = 300, kCaption = 34, kText = 16; // of a picture, and of what stands below it
+constexpr double kFocus = 2.6;   // the camera's distance from a picture one unit high
+constexpr double kMargin = 1.06; // a picture's size over that of what is shown
 
 std::string vector(const dvec3& v) {
     return fmt::format("<{:.14g}, {:.14g}, {:.14g}>", v.x, v.y, v.z);
 }
 
 // All but the camera and the object. The plane is a hair below the soles: a triangle in it would look lit.
-std::string surroundings(const Stage& stage) {
+std::string surroundings(const Stage& stage, const dvec3& eye) {
     const Lamp lamp = stage.lamp(0);
     return fmt::format("#version 3.7;\nglobal_settings {{ assumed_gamma 1 }}\nbackground {{ color rgb 1 }}\n"
                        "light_source {{ {} color rgb 1 area_light {}, {}, 9, 9 adaptive 2 jitter }}\n"
                        "light_source {{ {} color rgb 0.25 shadowless }}\n"
                        "plane {{ {}, {:.14g} pigment {{ color rgb 1 }} finish {{ ambient 0.28 diffuse 0.75 }} }}\n"
                        "#declare Only_Cover = true;\n",
-                       vector(lamp.center), vector(lamp.side), vector(lamp.other_side), vector(stage.eye()),
-                       vector(stage.up()), stage.ground_height() - 1e-4 * stage.radius());
+                       vector(lamp.center), vector(lamp.side), vector(lamp.other_side), vector(eye), vector(stage.up()),
+                       stage.ground_height() - 1e-4 * stage.radius());
 }
 
-std::string scene_of_object(const Stage& stage, const Exhibit& exhibit) {
+dvec3 eye_of(const Stage& stage, const Extent& shown) {
+    const double slope = 1 / (2 * kFocus * kMargin);
+    return stage.eye(stage.ground(stage.radius()), shown, {slope * kWidth / kHeight, slope});
+}
+
+std::string scene_of_object(const Stage& stage, const Extent& shown, const Exhibit& exhibit) {
     const cli::Camera& c = stage.camera();
-    return surroundings(stage) + exhibit.scene +
-           fmt::format("camera {{ location {} direction {} up {} right {} }}\nobject {{ Cover }}\n",
-                       vector(stage.eye()), vector(c.forward * 2.6), vector(c.up),
-                       vector(c.right * (double{kWidth} / kHeight)));
+    const dvec3 eye = eye_of(stage, shown);
+    return surroundings(stage, eye) + exhibit.scene +
+           fmt::format("camera {{ location {} direction {} up {} right {} }}\nobject {{ Cover }}\n", vector(eye),
+                       vector(c.forward * kFocus), vector(c.up), vector(c.right * (double{kWidth} / kHeight)));
 }
 
 std::string scene_of_ground(const Stage& stage, const Extent& shown, const Exhibit& exhibit) {
     const Ground ground = stage.ground(stage.radius());
     const dvec3 middle =
         ground.corner + (shown.x0 + shown.x1) / 2 * ground.right + (shown.y0 + shown.y1) / 2 * ground.down;
-    const double wide = 1.1 * std::max(shown.x1 - shown.x0, (shown.y1 - shown.y0) * kWidth / kHeight);
-    return surroundings(stage) + exhibit.scene +
+    const double wide = kMargin * std::max(shown.x1 - shown.x0, (shown.y1 - shown.y0) * kWidth / kHeight);
+    return surroundings(stage, eye_of(stage, shown)) + exhibit.scene +
            fmt::format("camera {{ orthographic location {} direction {} up {} right {} }}\n"
                        "object {{ Cover no_image }}\n",
                        vector(middle + 4 * stage.radius() * stage.up()), vector(-stage.up()),
@@ -94,12 +101,7 @@ void draw_caption(cli::Sheet& sheet, const cli::Font& font, const std::string& t
     cli::TextImage line = font.draw(text, kText);
     for (uint32_t size = kText - 1; line.width > kWidth && size > 8; --size) line = font.draw(text, size);
     const uint32_t x0 = left + (kWidth - std::min(line.width, kWidth)) / 2, y0 = top + (kCaption - line.height) / 2;
-    for (uint32_t y = 0; y < line.height; ++y)
-        for (uint32_t x = 0; x < std::min(line.width, kWidth); ++x)
-            for (size_t channel = 0; channel < 3; ++channel) {
-                uint8_t& value = sheet.rgb[(size_t{sheet.width} * (y0 + y) + x0 + x) * 3 + channel];
-                value = static_cast<uint8_t>(value - (value - 32) * line.coverage[size_t{line.width} * y + x] / 255);
-            }
+    cli::draw_line(sheet, line, x0, y0);
 }
 
 } // namespace
@@ -128,7 +130,7 @@ bool write_shadow_sheet(const std::vector<ExhibitRow>& rows, const std::string& 
             const ExhibitRow& r = rows[row];
             const Exhibit& exhibit = r.exhibits[column];
             const std::string stem = fmt::format("{}/picture-{}-{}", folder, row + 1, column + 1);
-            const auto object = trace(scene_of_object(r.stage, exhibit), povray, stem + "a");
+            const auto object = trace(scene_of_object(r.stage, r.shown, exhibit), povray, stem + "a");
             const auto ground = trace(scene_of_ground(r.stage, r.shown, exhibit), povray, stem + "b");
             if (!object || !ground) return false;
             const uint32_t left = column * kWidth, top = row * kRow;

@@ -22,7 +22,7 @@ std::string pov_mesh(MeshView mesh);
 /// window that holds `shown`.
 struct ExhibitRow {
     Stage stage;
-    Extent shown; ///< of stage.ground(stage.radius())
+    Extent shown; ///< of stage.ground(stage.radius()): where the shadows fall
     std::vector<Exhibit> exhibits;
 };
 

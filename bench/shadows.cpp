@@ -10,6 +10,7 @@
 #include "bench/shadow.hpp"
 #include "bench/shadow_pictures.hpp"
 #include "bench/stage.hpp"
+#include "cli/grouped.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -70,18 +71,21 @@ void add_covers(Competition& c, const Arguments& a) {
         fmt::print("{}: the mesh is open, and the analytic method needs a closed one: left out\n", c.model.name);
 }
 
+// What the shadow reaches from any point of the lamp.
+template <class Caster> Extent reach_of(const Caster& caster, const Lamp& lamp, const Ground& ground) {
+    Extent out;
+    for (const int i : {0, kLampPoints - 1})
+        for (const int j : {0, kLampPoints - 1}) out.add(shadow_extent(caster, lamp.point(i, j, kLampPoints), ground));
+    return out;
+}
+
 void measure(Competition& c, const Stage& stage) {
     const MeshView mesh = c.model.mesh.view();
     const Ground ground = stage.ground(2 * stage.radius() / kAcross);
     for (int k = 0; k < kLamps; ++k) {
         const Lamp lamp = stage.lamp(360.0 * k / kLamps);
-        Extent extent;
-        for (const int i : {0, kLampPoints - 1})
-            for (const int j : {0, kLampPoints - 1}) {
-                const auto light = lamp.point(i, j, kLampPoints);
-                extent.add(shadow_extent(mesh, light, ground));
-                for (const Entry& e : c.entries) extent.add(shadow_extent(e.leaves, light, ground));
-            }
+        Extent extent = reach_of(mesh, lamp, ground);
+        for (const Entry& e : c.entries) extent.add(reach_of(e.leaves, lamp, ground));
         const Ground window = Stage::window(ground, extent, 1);
         const Shadow truth = shadow_of(mesh, lamp, window, kLampPoints);
         for (Entry& e : c.entries) {
@@ -97,9 +101,9 @@ ExhibitRow exhibit(const Competition& c, const Stage& stage) {
     const MeshView mesh = c.model.mesh.view();
     const Ground ground = stage.ground(stage.radius());
     const Lamp lamp = stage.lamp(0);
-    row.shown = shadow_extent(mesh, lamp.center, ground);
+    row.shown = reach_of(mesh, lamp, ground);
     row.exhibits.push_back(
-        {pov_mesh(mesh), fmt::format("{}: mesh, {} triangles", c.model.name, mesh.triangles.size())});
+        {pov_mesh(mesh), fmt::format("{}: mesh, {} triangles", c.model.name, cli::grouped(mesh.triangles.size()))});
     for (const auto& [made_of, count] :
          {std::pair{"ellipsoids, analytic", kEllipsoids}, {"ellipsoids", kEllipsoids}, {"spheres", kSpheres}}) {
         const Entry* const e = c.find(made_of, count);
@@ -107,7 +111,7 @@ ExhibitRow exhibit(const Competition& c, const Stage& stage) {
             row.exhibits.push_back({"#declare Cover = union { }\n", fmt::format("{} {}: none", count, made_of)});
             continue;
         }
-        row.shown.add(shadow_extent(e->leaves, lamp.center, ground));
+        row.shown.add(reach_of(e->leaves, lamp, ground));
         const std::string method = std::string(made_of) == "ellipsoids" ? ", voxel" : "";
         const auto pieces = cli::pieces_of(e->tree.view(), e->tree.view().level_count() - 1);
         row.exhibits.push_back(

@@ -3,20 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 namespace prolate::bench {
 
 using glm::dvec3;
 
-Stage::Stage(MeshView mesh, const cli::View& view) : up_(cli::up_vector(view.up)), camera_(cli::make_camera(view)) {
-    dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
-    height_ = low.x;
+Stage::Stage(MeshView mesh, const cli::View& view)
+    : up_(cli::up_vector(view.up)), low_(std::numeric_limits<double>::infinity()), high_(-low_),
+      camera_(cli::make_camera(view)) {
+    height_ = low_.x;
     for (const Vec3& v : mesh.vertices) {
         const dvec3 p(v.x, v.y, v.z);
-        low = glm::min(low, p), high = glm::max(high, p);
+        low_ = glm::min(low_, p), high_ = glm::max(high_, p);
         height_ = std::min(height_, glm::dot(p, up_));
     }
-    center_ = (low + high) / 2.0;
+    center_ = (low_ + high_) / 2.0;
     for (const Vec3& v : mesh.vertices) radius_ = std::max(radius_, glm::length(dvec3(v.x, v.y, v.z) - center_));
 }
 
@@ -30,8 +32,28 @@ Lamp Stage::lamp(double turn) const {
     return {center_ + 5 * radius_ * to_lamp, side, other_side};
 }
 
-dvec3 Stage::eye() const {
-    return center_ + radius_ * (1.3 * camera_.eye + 0.45 * camera_.right); // the shadow falls to the right
+// A point at a to the right and z ahead is in view from (x, e) if |a - x| <= slope (z - e): from all points together, a
+// middle x and the largest e. The same upwards; the smaller e holds.
+dvec3 Stage::eye(const Ground& ground, const Extent& shown, const glm::dvec2& slopes) const {
+    std::vector<dvec3> points;
+    for (const double x : {shown.x0, shown.x1})
+        for (const double y : {shown.y0, shown.y1})
+            points.push_back(ground.corner + x * ground.right + y * ground.down);
+    for (int corner = 0; corner < 8; ++corner)
+        points.push_back(glm::mix(low_, high_, glm::bvec3(corner & 1, corner & 2, corner & 4)));
+    double ahead = std::numeric_limits<double>::infinity();
+    dvec3 out(0);
+    for (const int axis : {0, 1}) {
+        const dvec3& across = axis == 0 ? camera_.right : camera_.up;
+        double least = std::numeric_limits<double>::infinity(), most = -least;
+        for (const dvec3& p : points) {
+            const double a = glm::dot(p, across), reach = slopes[axis] * glm::dot(p, camera_.forward);
+            least = std::min(least, a + reach), most = std::max(most, a - reach);
+        }
+        out += (least + most) / 2 * across;
+        ahead = std::min(ahead, (least - most) / (2 * slopes[axis]));
+    }
+    return out + ahead * camera_.forward;
 }
 
 Ground Stage::ground(double pitch) const {

@@ -14,9 +14,11 @@ public:
     /// The lamp, `turn` degrees around the vertical from where the pictures have it: 45 degrees high, 5 radii away, its
     /// sides half a radius long.
     Lamp lamp(double turn) const;
-    /// The camera of the pictures.
-    glm::dvec3 eye() const;
+    /// The camera of the pictures; its eye is not where it stands for them.
     const cli::Camera& camera() const { return camera_; }
+    /// That place: the nearest from where the model and the rectangle `shown` of `ground` are in the picture, whose
+    /// borders are seen at these slopes to the right and upwards.
+    glm::dvec3 eye(const Ground& ground, const Extent& shown, const glm::dvec2& slopes) const;
     glm::dvec3 center() const { return center_; }
     /// Of a ball around the mesh.
     double radius() const { return radius_; }
@@ -30,7 +32,7 @@ public:
     static Ground window(const Ground& ground, const Extent& extent, int border);
 
 private:
-    glm::dvec3 up_, center_;
+    glm::dvec3 up_, low_, high_, center_; // low and high: of the mesh's box
     double radius_ = 0, height_ = 0;
     cli::Camera camera_;
 };
