@@ -22,6 +22,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <regex>
@@ -192,12 +193,34 @@ void expect_sound_buffers(const Chunks& glb) {
     EXPECT_EQ(views.size(), gltf["bufferViews"].size());
 }
 
+// Khronos' validator complains of what nobody refers to.
+void expect_all_used(const Json& gltf) {
+    std::map<std::string, std::set<size_t>> used;
+    for (const Json& scene : gltf["scenes"])
+        for (const Json& node : scene["nodes"]) used["nodes"].insert(node.get<size_t>());
+    for (const Json& node : gltf["nodes"]) {
+        EXPECT_TRUE(node.contains("mesh") || node.contains("children")) << "an empty node";
+        if (node.contains("mesh")) used["meshes"].insert(node["mesh"].get<size_t>());
+        for (const Json& child : node.value("children", Json::array())) used["nodes"].insert(child.get<size_t>());
+    }
+    for (const Json& mesh : gltf["meshes"])
+        for (const Json& part : mesh["primitives"]) {
+            used["materials"].insert(part["material"].get<size_t>());
+            used["accessors"].insert(part["indices"].get<size_t>());
+            for (const Json& attribute : part["attributes"]) used["accessors"].insert(attribute.get<size_t>());
+        }
+    for (const Json& accessor : gltf["accessors"]) used["bufferViews"].insert(accessor["bufferView"].get<size_t>());
+    for (const auto& [kind, which] : used)
+        EXPECT_TRUE(which.size() == gltf[kind].size() && *which.rbegin() + 1 == which.size()) << kind;
+}
+
 TEST_F(Export, GlbIsWhatTheSpecificationAsksFor) {
     const std::vector<Piece> pieces = some_pieces(100);
     for (const uint32_t segments : {4u, 32u, 100u, kMaxSegments}) {
         const Chunks glb = open_glb(as_glb(pieces, segments));
         expect_sound_buffers(glb);
         const Json& gltf = glb.gltf;
+        expect_all_used(gltf);
         const std::set<std::string> known{"asset",     "scene",   "scenes",      "nodes",    "meshes",
                                           "materials", "buffers", "bufferViews", "accessors"};
         for (const auto& [key, value] : gltf.items()) EXPECT_TRUE(known.contains(key)) << key;
@@ -232,7 +255,10 @@ TEST_F(Export, GlbIsWhatTheSpecificationAsksFor) {
         for (const Json& node : gltf["nodes"]) {
             if (!node.contains("mesh")) continue;
             double length = 0;
-            for (const double x : node["rotation"]) length += x * x;
+            for (const double x : node["rotation"]) {
+                length += x * x;
+                EXPECT_LE(std::abs(x), 1);
+            }
             EXPECT_NEAR(length, 1, 1e-12);
             for (const double radius : node["scale"]) EXPECT_GT(radius, 0);
         }
@@ -246,6 +272,12 @@ TEST_F(Export, AChangedByteOfAGlbIsFound) { // the check above is no formality
     Chunks glb = open_glb(as_glb(some_pieces(3), 8));
     glb.binary[3] = static_cast<char>(0x7e); // of the first coordinate, now 4e37
     EXPECT_NONFATAL_FAILURE(expect_sound_buffers(glb), "max");
+}
+
+TEST_F(Export, AnUnusedMaterialOfAGlbIsFound) {
+    Json gltf = open_glb(as_glb(some_pieces(3), 8)).gltf;
+    gltf["materials"].push_back(gltf["materials"][0]);
+    EXPECT_NONFATAL_FAILURE(expect_all_used(gltf), "materials");
 }
 
 TEST_F(Export, AssimpFindsEveryEllipsoidInTheGlb) {
