@@ -38,7 +38,8 @@ public:
     };
     Closeness closeness(std::span<const Ellipsoid> ellipsoids) const;
 
-    bool closed() const { return closed_; }
+    /// For the builder's other measures.
+    const Winding& winding() const { return *winding_; }
     /// Of the mesh's bounding box.
     double diagonal() const { return glm::length(high_ - low_); }
 

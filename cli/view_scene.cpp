@@ -111,11 +111,12 @@ std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBloc
     if (body.mesh) {
         out["mesh"] = mesh_of(body.mesh->mesh, numbers);
         out["mesh"]["closed"] = body.mesh->report.closed;
-        const auto lattice = distance_lattice(tree, *body.mesh, kLatticeNodes, progress);
+        const Solid solid(body.mesh->mesh.view(), body.mesh->report.closed);
+        const auto lattice = distance_lattice(tree, *body.mesh, solid, kLatticeNodes, progress);
         if (!lattice) return {};
         if (info.diagonal > 0) out["lattice"] = lattice_of(*lattice, info.diagonal, numbers);
         if (!info.exact) {
-            const NodeFigures figures = node_figures(tree, *body.mesh, *lattice);
+            const NodeFigures figures = node_figures(tree, *body.mesh, solid, *lattice);
             out["nodes"]["outside_volume"] = numbers.add(to_floats(figures.outside_volume));
             out["nodes"]["sub_volume"] = numbers.add(to_floats(figures.sub_volume));
         }

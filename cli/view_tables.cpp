@@ -2,8 +2,9 @@
 // columns, which measured the levels' figures too. Sub-volumes: one descent for each lattice node inside the solid.
 #include "cli/view_tables.hpp"
 
+#include "cli/scene.hpp"
+
 #include "builder/columns.hpp"
-#include "builder/winding.hpp"
 
 #include <tbb/parallel_for.h>
 
@@ -18,15 +19,10 @@ constexpr int kColumnsAcross = 200;
 
 Box box_of(const TreeView& tree, const Mesh& mesh) {
     Box box;
-    for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
+    box.add(mesh.view());
     // The root sticks out by far the most, and would take the lattice's nodes away from where they are looked at.
     tree.for_each_node([&](uint32_t node) {
-        if (node == 0 && tree.node_count() > 1) return;
-        const Ellipsoid e = tree.ellipsoid(node);
-        const Vec center = to_vec(e.center);
-        const Vec half(e.l11, std::hypot(double{e.l21}, double{e.l22}),
-                       std::hypot(double{e.l31}, double{e.l32}, double{e.l33}));
-        box.add(center - half), box.add(center + half);
+        if (node != 0 || tree.node_count() == 1) box.add(tree.ellipsoid(node));
     });
     return box;
 }
@@ -38,27 +34,26 @@ double filled(double distance, double pitch) {
 
 } // namespace
 
-std::optional<DistanceLattice> distance_lattice(const TreeView& tree, const CleanMesh& mesh, uint32_t nodes,
-                                                const std::function<bool(double)>& progress) {
+std::optional<DistanceLattice> distance_lattice(const TreeView& tree, const CleanMesh& mesh, const Solid& solid,
+                                                uint32_t nodes, const std::function<bool(double)>& progress) {
     const Box box = box_of(tree, mesh.mesh);
-    const Vec size = box.size().cwiseMax(1e-3 * box.size().maxCoeff());
+    const glm::dvec3 center = (box.low + box.high) / 2.0, extent = box.high - box.low;
+    const glm::dvec3 size = glm::max(extent, glm::dvec3(1e-3 * std::max({extent.x, extent.y, extent.z})));
     DistanceLattice out;
-    out.pitch = std::cbrt(size.prod() / nodes);
+    out.pitch = std::cbrt(size.x * size.y * size.z / nodes);
     for (glm::length_t a = 0; a < 3; ++a) {
         // A step beyond the box on either side.
         out.size[static_cast<size_t>(a)] = static_cast<uint32_t>(std::ceil(size[a] / out.pitch)) + 3;
-        out.origin[a] = box.center()[a] - 0.5 * out.pitch * (out.size[static_cast<size_t>(a)] - 1);
+        out.origin[a] = center[a] - 0.5 * out.pitch * (out.size[static_cast<size_t>(a)] - 1);
     }
     const uint32_t nx = out.size[0], ny = out.size[1], nz = out.size[2];
     out.distance.resize(size_t{nx} * ny * nz);
-    const Winding winding(mesh.mesh.view());
     for (uint32_t k = 0; k < nz; ++k) {
         tbb::parallel_for(uint32_t{0}, ny, [&, k](uint32_t j) {
             for (uint32_t i = 0; i < nx; ++i) {
-                const Vec p = Vec(out.origin.x, out.origin.y, out.origin.z) + out.pitch * Vec(i, j, k);
-                const double distance = winding.tree().distance(p);
-                const bool inside = std::abs(winding(p)) >= 0.5;
-                out.distance[(size_t{k} * ny + j) * nx + i] = static_cast<float>(inside ? -distance : distance);
+                const glm::dvec3 p = out.origin + out.pitch * glm::dvec3(i, j, k);
+                const double distance = solid.distance(p);
+                out.distance[(size_t{k} * ny + j) * nx + i] = static_cast<float>(solid.holds(p) ? -distance : distance);
             }
         });
         if (!progress((k + 1.0) / nz)) return {};
@@ -66,7 +61,8 @@ std::optional<DistanceLattice> distance_lattice(const TreeView& tree, const Clea
     return out;
 }
 
-NodeFigures node_figures(const TreeView& tree, const CleanMesh& mesh, const DistanceLattice& lattice) {
+NodeFigures node_figures(const TreeView& tree, const CleanMesh& mesh, const Solid& solid,
+                         const DistanceLattice& lattice) {
     NodeFigures out;
     std::vector<uint32_t> place(tree.slot_count(), 0); // of a slot in the tables
     std::vector<uint32_t> slots;
@@ -74,8 +70,7 @@ NodeFigures node_figures(const TreeView& tree, const CleanMesh& mesh, const Dist
         place[node] = static_cast<uint32_t>(slots.size());
         slots.push_back(node);
     });
-    const Winding winding(mesh.mesh.view());
-    const Columns columns = measuring_columns(mesh.mesh.view(), mesh.report.closed, winding, kColumnsAcross);
+    const Columns columns = measuring_columns(mesh.mesh.view(), mesh.report.closed, solid.winding(), kColumnsAcross);
     out.outside_volume.resize(slots.size());
     tbb::parallel_for(size_t{0}, slots.size(), [&](size_t n) {
         const Ellipsoid e = tree.ellipsoid(slots[n]);

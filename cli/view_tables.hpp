@@ -2,6 +2,8 @@
 // against the solid. Display only: nothing here is certified, and no query depends on it.
 #pragma once
 
+#include "cli/solid.hpp"
+
 #include <prolate/mesh.hpp>
 #include <prolate/tree.hpp>
 
@@ -34,11 +36,12 @@ struct NodeFigures {
     std::vector<double> sub_volume;
 };
 
-/// About `nodes` lattice nodes. In parallel. `progress`, called with the fraction done, may return false to stop; then
-/// there is no answer.
-std::optional<DistanceLattice> distance_lattice(const TreeView& tree, const CleanMesh& mesh, uint32_t nodes,
-                                                const std::function<bool(double)>& progress);
+/// `solid` is that of the mesh. About `nodes` lattice nodes. In parallel. `progress`, called with the fraction done,
+/// may return false to stop; then there is no answer.
+std::optional<DistanceLattice> distance_lattice(const TreeView& tree, const CleanMesh& mesh, const Solid& solid,
+                                                uint32_t nodes, const std::function<bool(double)>& progress);
 
-NodeFigures node_figures(const TreeView& tree, const CleanMesh& mesh, const DistanceLattice& lattice);
+NodeFigures node_figures(const TreeView& tree, const CleanMesh& mesh, const Solid& solid,
+                         const DistanceLattice& lattice);
 
 } // namespace prolate::cli
