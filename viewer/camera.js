@@ -1,5 +1,5 @@
 // A camera that orbits around a point, upright. Azimuth and elevation are those of `prolate render --view`.
-import {add, clamp, cross, dot, normalised, scaled, subtract} from './vector.js';
+import {add, clamp, cross, dot, ends, most, normalised, scaled, subtract} from './vector.js';
 
 const kSlope = Math.tan(Math.PI / 180 * 15); // half the picture's height, at distance 1
 const kMargin = 0.9; // of the picture is used
@@ -27,13 +27,13 @@ export class Camera {
   fit(extents, aspect) {
     Object.assign(this, kStart);
     const axes = this.axes(), [right, up, near] = [axes.right, axes.up, scaled(axes.forward, -1)].map(extents);
-    const ends = (list) => [Math.min(...list.map((e) => e[0])), Math.max(...list.map((e) => e[1]))];
-    const middle = [right, up, near].map((list) => (ends(list)[0] + ends(list)[1]) / 2);
+    const middle = [right, up, near].map(ends).map(([low, high]) => (low + high) / 2);
     this.target = add(add(scaled(axes.right, middle[0]), scaled(axes.up, middle[1])), scaled(axes.forward, -middle[2]));
     // A part whose image is to end within the border needs so much distance at its nearest point.
-    const needed = (list, center, slope) => Math.max(...list.map(
+    const needed = (list, center, slope) => most(
+        list,
         ([low, high], i) => Math.max(Math.abs(low - center), Math.abs(high - center)) / slope +
-            (near[i][0] + near[i][1]) / 2 - middle[2]));
+            (near[i][0] + near[i][1]) / 2 - middle[2]);
     this.distance =
         Math.max(needed(right, middle[0], kMargin * kSlope * aspect), needed(up, middle[1], kMargin * kSlope));
   }

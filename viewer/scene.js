@@ -1,6 +1,6 @@
 // The scene that `prolate view` has put into the page: a description in JSON, and a block of numbers that it refers to.
 import {element} from './dom.js';
-import {add, clamp, directionToBody, dot, kIdentity, scaled, subtract, toWorld} from './vector.js';
+import {add, clamp, directionToBody, dot, ends, kIdentity, scaled, subtract, toWorld} from './vector.js';
 
 const kArrays = {
   f32: Float32Array,
@@ -115,11 +115,7 @@ export function readScene() {
 
 /// A pose for body b beside body a, in this direction of the world, and clear of it.
 export function beside(a, b, direction) {
-  const reach = (body) => {
-    const ends = body.extents(direction);
-    return [Math.min(...ends.map((end) => end[0])), Math.max(...ends.map((end) => end[1]))];
-  };
-  const [lowA, highA] = reach(a), [lowB, highB] = reach(b);
+  const [lowA, highA] = ends(a.extents(direction)), [lowB, highB] = ends(b.extents(direction));
   const apart = subtract(a.middle, b.middle);
   const push = highA - lowB + 0.15 * (highA - lowA + highB - lowB) - dot(apart, direction);
   return {translation: add(apart, scaled(direction, push)), rotation: [0, 0, 0, 1]};

@@ -10,6 +10,12 @@ export const length = (a) => Math.hypot(a[0], a[1], a[2]);
 export const normalised = (a) => scaled(a, 1 / length(a));
 export const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 
+/// Of lists of any length; Math.min(...list) has as many arguments as the list is long, and browsers limit these.
+export const least = (list, value) => list.reduce((soFar, item, i) => Math.min(soFar, value(item, i)), Infinity);
+export const most = (list, value) => list.reduce((soFar, item, i) => Math.max(soFar, value(item, i)), -Infinity);
+/// Where intervals [low, high] begin and end together.
+export const ends = (list) => [least(list, (one) => one[0]), most(list, (one) => one[1])];
+
 export const kIdentity = Object.freeze({translation: [0, 0, 0], rotation: [0, 0, 0, 1]});
 
 export function aboutAxis(axis, angle) {

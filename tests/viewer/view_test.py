@@ -99,6 +99,11 @@ class OneTree(PageTest):
         self.browser.keys("r")
         self.assertEqual(self.js(view), start)
 
+    def test_the_camera_fits_any_number_of_nodes(self):
+        fit = "(viewer.camera.fit(() => Array.from({length: arguments[0]}, (_, i) => [-1, i % 7 / 6]), 1)," \
+              " viewer.camera.distance)"
+        self.assertEqual(self.js(fit, 300_000), self.js(fit, 7))
+
     def test_keys_and_their_sheet(self):
         self.browser.keys("1")
         self.assertEqual(self.js("viewer.state.level"), 1)
