@@ -36,23 +36,28 @@ export class BodyLayers {
     }
   }
 
-  drawCover(program, view, look) {
-    const {gl, body} = this, {lattice} = body;
+  /// `programWith(switches)` gives the program: what is not asked for must not cost time in each pixel.
+  drawCover(programWith, view, look) {
+    const {gl, body} = this, {lattice} = body, outside = look.colouring === 'outside';
     // Made when first needed: the first picture comes sooner.
-    const distances = lattice && (look.colouring === 'outside' || look.section);
+    const distances = Boolean(lattice && (outside || look.section));
     if (distances) {
       this.distances ??= distanceTexture(gl, lattice);
       bindTexture(gl, 0, this.distances, gl.TEXTURE_3D);
     }
+    const program = programWith({
+      WIRE: look.wire,
+      SECTION: Boolean(look.section),
+      HAS_DISTANCE: distances,
+      OUTSIDE: outside && distances,
+    });
     program.use({
       ...view,
-      u_wire: look.wire,
       u_line: 0.6 * look.line,
-      u_colouring: look.colouring === 'outside' && !lattice ? 2 : {branch: 0, outside: 1, body: 2}[look.colouring],
+      u_of_body: look.colouring !== 'branch',
       u_body_colour: look.colouring === 'body' ? kBodyColours[this.index] : kMesh,
       u_mark_colour: kContact,
       u_solid_colour: kMesh,
-      u_has_distance: Boolean(distances),
       u_distance: 0,
       u_distance_origin: lattice ? lattice.origin.map((x) => x - lattice.pitch / 2) : [0, 0, 0],
       u_distance_step: lattice ? lattice.size.map((n) => 1 / (n * lattice.pitch)) : [0, 0, 0],

@@ -11,6 +11,9 @@
 // A section cuts along a plane. Where a ray enters through the plane, the flat cut shows; of ellipsoids that overlap
 // there, the one that holds the point deepest, which has one clean border to its neighbour: depths get a small part of
 // |y|^2, on round surfaces and meshes too, or these would come before the cut where they lie just behind it.
+//
+// The macros WIRE, SECTION, HAS_DISTANCE and OUTSIDE are true or false: where no graphics card helps, both sides of each
+// branch are paid for unless the compiler can drop one.
 
 export const kShading = /* glsl */ `
 #define SECTION_DEPTH 1e-4 // of the range of depths
@@ -87,10 +90,9 @@ layout(location = 1) out uint o_id;
 uniform vec3 u_eye, u_key, u_sky;
 uniform vec2 u_depth;   // picture depth = x - y / t
 uniform vec2 u_range;   // of t
-uniform vec4 u_section; // kept: dot(xyz, p) < w; xyz = 0 without
-uniform bool u_wire, u_has_distance;
+uniform vec4 u_section; // kept: dot(xyz, p) < w
 uniform float u_line; // half a wire's width, pixels
-uniform int u_colouring; // 0 the node's, 1 outside distance, 2 the body's
+uniform bool u_of_body; // the body's colour, not the node's
 uniform vec3 u_body_colour, u_mark_colour, u_solid_colour;
 uniform sampler3D u_distance;
 uniform vec3 u_distance_origin, u_distance_step; // p -> texture coordinates
@@ -114,17 +116,17 @@ void main() {
   float t = nearest - half_chord, last = nearest + half_chord;
   // Here, where all pixels are on their way, so that differences to the neighbours make sense.
   float wire_front = 0.0, wire_back = 0.0;
-  if (u_wire) wire_front = on_wire(v_y + t * v_e, squared), wire_back = on_wire(v_y + last * v_e, squared);
-  bool sectioned = u_section.xyz != vec3(0), cut = false;
+  if (WIRE) wire_front = on_wire(v_y + t * v_e, squared), wire_back = on_wire(v_y + last * v_e, squared);
+  bool cut = false;
   float speed = 0.0, start = -1.0, crossing = 0.0, solid = 1.0, width = 1.0;
-  if (sectioned) {
+  if (SECTION) {
     speed = dot(u_section.xyz, v_direction), start = dot(u_section.xyz, u_eye) - u_section.w;
     crossing = -start / speed;
-    if (u_has_distance) solid = distance_at(u_eye + crossing * v_direction), width = max(fwidth(solid), 1e-6);
+    if (HAS_DISTANCE) solid = distance_at(u_eye + crossing * v_direction), width = max(fwidth(solid), 1e-6);
   }
   if (squared >= 1.0 || last < u_range.x) discard;
 
-  if (sectioned && start + t * speed > 0.0) {
+  if (SECTION && start + t * speed > 0.0) {
     if (speed >= 0.0 || crossing > last) discard;
     t = crossing;
     cut = true;
@@ -134,7 +136,7 @@ void main() {
     t = last;
     if (start + t * speed > 0.0) discard;
   }
-  if (u_wire && !cut && wire_front > u_line) {
+  if (WIRE && !cut && wire_front > u_line) {
     if (wire_back > u_line || start + last * speed > 0.0) discard;
     t = last;
   }
@@ -143,19 +145,19 @@ void main() {
   vec3 n = normalize(vec3(i.x * y.x + m.x * y.y + m.y * y.z, i.y * y.y + m.z * y.z, i.z * y.z));
   if (dot(n, v_direction) > 0.0) n = -n;
 
-  vec3 colour = linear(u_colouring == 0 ? v_colour : u_body_colour);
-  if (u_colouring == 1) colour = linear(texture(u_ramp, vec2(max(distance_at(p), 0.0) / u_ramp_end, 0.5)).rgb);
+  vec3 colour = linear(u_of_body ? u_body_colour : v_colour);
+  if (OUTSIDE) colour = linear(texture(u_ramp, vec2(max(distance_at(p), 0.0) / u_ramp_end, 0.5)).rgb);
   else if (v_mark > 0.5) colour = linear(u_mark_colour);
   if (cut) {
     // Flat, and where the solid is known, it shows: what is coloured sticks out of it.
-    if (u_has_distance) {
+    if (HAS_DISTANCE) {
       colour = mix(0.9 * linear(u_solid_colour), colour, clamp(solid / width + 0.5, 0.0, 1.0));
       colour *= 1.0 - 0.6 * clamp(1.2 - abs(solid) / width, 0.0, 1.0);
     }
   } else {
-    colour = shade(u_wire ? 0.55 * colour : colour, n, u_key, u_sky);
+    colour = shade(WIRE ? 0.55 * colour : colour, n, u_key, u_sky);
   }
-  gl_FragDepth = u_depth.x - u_depth.y / t + (sectioned ? SECTION_DEPTH * dot(y, y) : 0.0);
+  gl_FragDepth = u_depth.x - u_depth.y / t + (SECTION ? SECTION_DEPTH * dot(y, y) : 0.0);
   o_colour = stored(colour);
   o_id = v_id;
 }`;

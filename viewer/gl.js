@@ -1,12 +1,14 @@
 // The little that is repeated when one talks to WebGL.
 
 export class Program {
-  constructor(gl, vertex, fragment) {
+  /// `switches`: {name: boolean}, macros of the shaders.
+  constructor(gl, vertex, fragment, switches = {}) {
     this.gl = gl;
+    const macros = Object.entries(switches).map(([name, on]) => `#define ${name} ${Boolean(on)}\n`).join('');
     this.program = gl.createProgram();
     const shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map(([type, source]) => {
       const shader = gl.createShader(type);
-      gl.shaderSource(shader, '#version 300 es\n' + source);
+      gl.shaderSource(shader, '#version 300 es\n' + macros + source);
       gl.compileShader(shader);
       gl.attachShader(this.program, shader);
       return shader;

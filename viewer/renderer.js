@@ -40,7 +40,9 @@ export class Renderer {
   }
 
   /// Compiled when first needed.
-  program(name) { return this.programs[name] ??= new Program(this.gl, ...kSources[name]); }
+  program(name, switches = {}) {
+    return this.programs[name + JSON.stringify(switches)] ??= new Program(this.gl, ...kSources[name], switches);
+  }
 
   /// Pixels of the screen for one of the page, and the picture's shape.
   get pixelRatio() { return this.canvas.width / Math.max(1, this.canvas.clientWidth); }
@@ -76,7 +78,8 @@ export class Renderer {
     if (look.coverOpacity > 0)
       for (const layers of this.layers)
         layers.drawCover(
-            this.program('cover'), this.viewOf(layers.body, lens, look.section), {...look, wire: look.coverWire, line});
+            (switches) => this.program('cover', switches), this.viewOf(layers.body, lens, look.section),
+            {...look, wire: look.coverWire, line});
     this.mesh.bind();
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.DEPTH, 0, [1]);
