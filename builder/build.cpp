@@ -6,6 +6,7 @@
 #include "builder/exact.hpp"
 #include "builder/grow.hpp"
 #include "builder/hausdorff.hpp"
+#include "builder/hulls.hpp"
 
 #include "src/format.hpp"
 
@@ -112,8 +113,12 @@ private:
         if (progress_) options.progress = [this](double done) { return report("split", 0.1 + 0.75 * done, 0); };
         const auto grown = grow_exact(mesh_, options);
         if (!grown) return grown.error();
-        auto tree =
-            Tree::open(format::encode(describe(true), options_.degree, grown->lattice, grown->levels, grown->packed()));
+        std::vector<std::byte> bytes =
+            format::encode(describe(true), options_.degree, grown->lattice, grown->levels, grown->packed());
+        const auto without_hulls = TreeView::open(bytes);
+        if (!without_hulls) return without_hulls.error();
+        format::store_hulls(bytes, hulls_of(*without_hulls));
+        auto tree = Tree::open(std::move(bytes));
         if (!tree) return tree.error();
 
         std::vector<LevelReport> figures(tree->view().level_count()); // of a cover of the surface alone: none

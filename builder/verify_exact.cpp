@@ -3,21 +3,24 @@
 //
 // Rounding: corners and nodes are floats, taken as exact. Forward substitution of L y = p - c is backward stable, so
 // the computed y is wrong by less than 8 * 2^-53 |L| |L^-1| |y| (Higham, Accuracy and Stability, section 8.1);
-// kRounding asks for more than that below 1.
+// kRounding asks for more than that below 1. A corner lies in a hull, a share of the ellipsoid added, if a convex
+// combination of the hull's points is that near (hulls.hpp); its rounding is less than kHullRounding.
 #include "builder/verify_exact.hpp"
 
 #include "builder/fit.hpp"
+#include "builder/hulls.hpp"
 
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 
 namespace prolate {
 namespace {
 
-constexpr double kRounding = 0x1p-48;
+constexpr double kRounding = 0x1p-48, kHullRounding = 1e-10;
 
 // Corners of a triangle from the least one on, in the triangle's order: the same for the same oriented triangle.
 using Corners = std::array<std::tuple<float, float, float>, 3>;
@@ -60,20 +63,32 @@ Doubt compare(const TreeView& tree, MeshView mesh) {
     return out;
 }
 
-// For each node, a corner beneath it that it does not hold.
+bool in_hull(const Hull& hull, const Vec& w) {
+    const double enough = hull.share - kHullRounding;
+    return hull.distance(w, enough) <= enough;
+}
+
+// For each node, a corner beneath it that it, or its hull, does not hold.
 std::vector<Doubt> find_doubts(const TreeView& tree) {
     const uint32_t slots = tree.slot_count();
     std::vector<uint32_t> parent(slots, 0);
     std::vector<Ellipsoid> ellipsoids(slots);
     std::vector<double> largest(slots); // squared radial coordinate within, beyond doubt
+    std::vector<Fit> fits(slots);
+    std::vector<Doubt> doubts(slots);
+    std::vector<std::optional<Hull>> hulls(slots);
     tree.for_each_node([&](uint32_t n) {
         const ChildRange children = tree.children(n);
         for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
         ellipsoids[n] = tree.ellipsoid(n);
-        const Fit fit(ellipsoids[n]);
-        largest[n] = 1 - kRounding * fit.factor.norm() * fit.inverse.norm();
+        fits[n] = Fit(ellipsoids[n]);
+        largest[n] = 1 - kRounding * fits[n].factor.norm() * fits[n].inverse.norm();
+        if (children.count == 0) return;
+        hulls[n].emplace(tree.hull(children.first / kBlockLanes));
+        if (hulls[n]->share == 0) hulls[n].reset(); // it says nothing
+        if (const Vec3 c = ellipsoids[n].center; hulls[n] && !in_hull(*hulls[n], Vec::Zero()))
+            doubts[n].set(c.x, c.y, c.z);
     });
-    std::vector<Doubt> doubts(slots);
     tree.for_each_node([&](uint32_t leaf) {
         const TriangleRange triangles = tree.triangles(leaf);
         for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
@@ -81,7 +96,9 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
                 const Vec3 v = tree.vertex(corner);
                 const double p[3] = {v.x, v.y, v.z};
                 for (uint32_t node = leaf;; node = parent[node]) {
-                    if (!(radial_squared(ellipsoids[node], p) <= largest[node])) doubts[node].set(p[0], p[1], p[2]);
+                    if (!(radial_squared(ellipsoids[node], p) <= largest[node]) ||
+                        (hulls[node] && !in_hull(*hulls[node], fits[node].radial(to_vec(v)))))
+                        doubts[node].set(p[0], p[1], p[2]);
                     if (node == 0) break;
                 }
             }

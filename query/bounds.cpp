@@ -59,7 +59,7 @@ LocalBounds local_bounds(const TreeView& tree) noexcept {
         const PlacedEllipsoid e = place(tree.ellipsoid(node));
         box.add(extent(e, 0, kSeparationMargin));
     });
-    LocalBounds out{tree.ellipsoid(0), (box.lower + box.upper) * 0.5, (box.upper - box.lower) * 0.5, 0, 0};
+    LocalBounds out{tree.root(), (box.lower + box.upper) * 0.5, (box.upper - box.lower) * 0.5, 0, 0};
     out.radius = glm::length(out.half), out.reach = glm::length(out.center) + out.radius;
     return out;
 }

@@ -198,7 +198,7 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Query
     using glm::dvec3;
     RaycastResult out;
     const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
-    query::PlacedEllipsoid root = query::place(tree.ellipsoid(0));
+    query::PlacedEllipsoid root = query::place(tree.root());
     if (growth) root.size *= double{growth[0]}, root.reach *= double{growth[0]};
     const query::PlacedRay placed = query::place(ray, to_frame, root, options.margin);
     if (!placed.valid) return out;

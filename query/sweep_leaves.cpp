@@ -123,7 +123,7 @@ SweepSearch::SweepSearch(const TreeView& tree_a, const Motion& motion_a, const T
     : a(body(tree_a, sweep_options.max_level)), b(body(tree_b, sweep_options.max_level)), motion(motion_a, motion_b),
       options(sweep_options), entries(context.entries) {
     move_to(0);
-    const PlacedEllipsoid x = place(a.tree.ellipsoid(0)), y = place(b.tree.ellipsoid(0), now.b_to_a);
+    const PlacedEllipsoid x = place(a.tree.root()), y = place(b.tree.root(), now.b_to_a);
     const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);
     const double turned = motion.a().speed() + motion.b().speed();
     const double tolerance =

@@ -7,6 +7,7 @@
 
 #include <prolate/version.hpp>
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
 #include <iterator>
@@ -27,8 +28,8 @@ void store_node(std::byte* block, size_t lane, const PackedNode& node, uint32_t 
     store_le(block + kBlockFirst + 4 * lane, first);
 }
 
-void store_section(std::span<std::byte> section, const PackedTriangles& triangles) {
-    std::byte* to = section.data() + kSectionHashBytes;
+void store_section(std::span<std::byte> section, size_t hull_bytes, const PackedTriangles& triangles) {
+    std::byte* to = section.data() + hull_bytes + kSectionHashBytes;
     for (const Vec3& v : triangles.vertices)
         for (const float coordinate : {v.x, v.y, v.z}) store_le(to, coordinate), to += sizeof coordinate;
     const size_t width = index_bytes(static_cast<uint32_t>(triangles.vertices.size()));
@@ -40,7 +41,7 @@ void store_section(std::span<std::byte> section, const PackedTriangles& triangle
                 store_le(to, corner);
             to += width;
         }
-    store_le(section.data(), hash_bytes(section.subspan(kSectionHashBytes)));
+    store_le(section.data() + hull_bytes, section_hash(section, hull_bytes));
 }
 
 } // namespace
@@ -62,7 +63,8 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     const uint64_t blocks_end = end_of_blocks(level_count, first_block.back());
     const auto vertex_count = static_cast<uint32_t>(triangles.vertices.size());
     const auto triangle_count = static_cast<uint32_t>(triangles.triangles.size());
-    std::vector<std::byte> bytes(blocks_end + (info.exact ? section_bytes(vertex_count, triangle_count) : 0));
+    std::vector<std::byte> bytes(blocks_end +
+                                 (info.exact ? section_bytes(first_block.back(), vertex_count, triangle_count) : 0));
     std::byte* const h = bytes.data();
 
     std::memcpy(h + kAtMagic, kMagic, sizeof kMagic);
@@ -96,7 +98,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         store_le(h + kAtVertexCount, vertex_count);
         store_le(h + kAtTriangleCount, triangle_count);
         store_le(h + kAtComponentCount, triangles.components);
-        store_section({h + blocks_end, bytes.size() - blocks_end}, triangles);
+        store_section({h + blocks_end, bytes.size() - blocks_end}, first_block.back() * kHullBytes, triangles);
     }
 
     uint32_t next_triangle = 0;
@@ -135,6 +137,15 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     assert(next_triangle == triangle_count);
     store_le(h + kAtHeaderHash, header_hash({h, table_end(level_count)}));
     return bytes;
+}
+
+void store_hulls(std::span<std::byte> file, std::span<const std::byte> hulls) {
+    const uint32_t levels = load_le<uint16_t>(file.data() + kAtLevelCount);
+    const auto begin = load_le<uint64_t>(file.data() + kHeaderBytes + (levels - 1) * kLevelBytes + kLevelEndByte);
+    const std::span<std::byte> section = file.subspan(static_cast<size_t>(begin));
+    assert((begin - blocks_begin(levels)) / kBlockBytes * kHullBytes == hulls.size());
+    std::copy(hulls.begin(), hulls.end(), section.begin());
+    store_le(section.data() + hulls.size(), section_hash(section, hulls.size()));
 }
 
 } // namespace prolate::format

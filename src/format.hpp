@@ -60,9 +60,13 @@ struct PackedTriangles {
     uint32_t components = 0;
 };
 
-/// The bytes of a whole file; `triangles` are written if info.exact. Gives each family of siblings blocks of its own.
+/// The bytes of a whole file; `triangles` are written if info.exact, with hull records that know nothing. Gives each
+/// family of siblings blocks of its own.
 /// The caller keeps the invariants of FORMAT.md (counts that add up, degree and level limits).
 std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
                               std::span<const PackedLevel> levels, const PackedTriangles& triangles = {});
+
+/// Puts hull records (src/hull.hpp), one for each block, into a whole file of an exact tree.
+void store_hulls(std::span<std::byte> file, std::span<const std::byte> hulls);
 
 } // namespace prolate::format

@@ -4,6 +4,7 @@
 
 #include "src/block.hpp"
 #include "src/hash.hpp"
+#include "src/hull.hpp"
 
 #include <prolate/tree.hpp>
 
@@ -86,7 +87,8 @@ constexpr uint64_t end_of_blocks(uint32_t level_count, uint64_t blocks) {
     return blocks_begin(level_count) + blocks * kBlockBytes;
 }
 
-// The triangle section of an exact tree, which follows the blocks: hash, vertices, indices.
+// The triangle section of an exact tree, which follows the blocks: a hull record for each block, hash of all the rest,
+// vertices, indices.
 inline constexpr size_t kSectionHashBytes = 8, kVertexBytes = 12;
 
 // Bytes of a vertex index.
@@ -94,8 +96,14 @@ constexpr size_t index_bytes(uint32_t vertex_count) {
     return vertex_count <= 0x10000 ? 2 : 4;
 }
 
-constexpr uint64_t section_bytes(uint32_t vertices, uint32_t triangles) {
-    return kSectionHashBytes + uint64_t{vertices} * kVertexBytes + uint64_t{triangles} * 3 * index_bytes(vertices);
+constexpr uint64_t section_bytes(uint64_t blocks, uint32_t vertices, uint32_t triangles) {
+    return blocks * kHullBytes + kSectionHashBytes + uint64_t{vertices} * kVertexBytes +
+           uint64_t{triangles} * 3 * index_bytes(vertices);
+}
+
+// Of a whole section whose hulls take `hull_bytes`.
+inline uint64_t section_hash(std::span<const std::byte> section, size_t hull_bytes) {
+    return hash_bytes(section.subspan(hull_bytes + kSectionHashBytes), hash_bytes(section.first(hull_bytes)));
 }
 
 // Hash of header and levels table without the hash field itself.

@@ -247,7 +247,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     const uint32_t vertex_count = load_le<uint32_t>(h + kAtVertexCount);
     const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
     const uint64_t total =
-        end_of_blocks(level_count, blocks) + (exact ? section_bytes(vertex_count, triangle_count) : 0);
+        end_of_blocks(level_count, blocks) + (exact ? section_bytes(blocks, vertex_count, triangle_count) : 0);
     if (load_le<uint64_t>(h + kAtTotalSize) != total) return bad("wrong total size", kAtTotalSize);
     if (present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
     const uint64_t present_end = load_le<uint64_t>(h + kHeaderBytes + (present - 1) * kLevelBytes + kLevelEndByte);
@@ -292,14 +292,20 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
             return bad("the children of a level are not the next level", begin);
     }
     view.level_count_ = present;
+    view.root_ = view.ellipsoid(0);
     const uint64_t next_triangle = check.triangles();
     if (next_triangle > triangle_count || (present == level_count && next_triangle != triangle_count))
         return bad("the leaves do not share out the triangles", kAtTriangleCount);
     if (!exact || view.is_prefix_) return view;
 
-    const size_t section = present_end, vertices = section + kSectionHashBytes;
-    if (options.check_hash && hash_bytes(bytes.subspan(vertices)) != load_le<uint64_t>(h + section))
-        return bad("the triangles are damaged (hash mismatch)", section);
+    const size_t hulls = present_end, hull_bytes = view.block_count_ * kHullBytes, hash = hulls + hull_bytes;
+    const size_t vertices = hash + kSectionHashBytes;
+    if (options.check_hash && section_hash(bytes.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
+        return bad("the triangles are damaged (hash mismatch)", hash);
+    for (size_t at = hulls; at < hash; at += kHullBytes)
+        if (const size_t found = first_nonzero(h, at + kHullReserved, at + kHullBytes); found < at + kHullBytes)
+            return bad("reserved bytes are not zero", found);
+    view.hulls_ = h + hulls;
     view.vertices_ = h + vertices;
     view.triangles_ = view.vertices_ + size_t{vertex_count} * kVertexBytes;
     view.vertex_count_ = vertex_count;

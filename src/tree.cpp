@@ -31,6 +31,14 @@ uint32_t TreeView::first_slot(uint32_t l) const noexcept {
     return kBlockLanes * load_le<uint32_t>(bytes_.data() + kHeaderBytes + l * kLevelBytes + kLevelFirstBlock);
 }
 
+uint32_t TreeView::level_of(uint32_t slot) const noexcept {
+    assert(slot < slot_count());
+    const std::byte* row = bytes_.data() + kHeaderBytes + kLevelFirstBlock;
+    uint32_t level = 0;
+    while (level + 1 < level_count_ && slot / kBlockLanes >= load_le<uint32_t>(row += kLevelBytes)) ++level;
+    return level;
+}
+
 bool TreeView::surface_mode() const noexcept {
     return (load_le<uint32_t>(bytes_.data() + kAtFlags) & kSurfaceMode) != 0;
 }

@@ -38,7 +38,8 @@ using Bytes = std::vector<std::byte>;
 constexpr OpenOptions kNoHash{.check_hash = false};
 constexpr size_t kTable = 144, kRow = 60;
 constexpr size_t kBlocks = 384; // of the golden tree: 144 + 3 * 60 and zeros up to a multiple of 64
-constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256;
+constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
+constexpr size_t kGoldenHash = kEnd + kGoldenBlocks * 64; // of the exact one: what follows its hulls
 constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
 
 std::vector<PackedLevel> golden_levels() {
@@ -98,7 +99,12 @@ Bytes golden_exact() {
     auto levels = golden_levels();
     levels[1].nodes[1].triangle_count = kGoldenLeaves[0];
     for (size_t i = 0; i < 3; ++i) levels[2].nodes[i].triangle_count = kGoldenLeaves[i + 1];
-    return format::encode(info, 3, kGoldenLattice, levels, {kGoldenVertices, kGoldenTriangles, 2});
+    Bytes bytes = format::encode(info, 3, kGoldenLattice, levels, {kGoldenVertices, kGoldenTriangles, 2});
+    Bytes hulls(kGoldenBlocks * kHullBytes); // block 1: the root's children
+    for (size_t i = 0; i < 48; ++i) hulls[kHullBytes + i] = static_cast<std::byte>((5 * i + 136) % 256);
+    hulls[kHullBytes + 48] = std::byte{17};
+    format::store_hulls(bytes, hulls);
+    return bytes;
 }
 
 Bytes read(const fs::path& path) {
@@ -190,9 +196,9 @@ void expect_sound(const TreeView& tree) {
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenExactFileOfVersionThree) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v3_exact.etree");
-    ASSERT_EQ(file.size(), kEnd + 8 + 7 * 12 + 5 * 6);
+TEST(Format, GoldenExactFileOfVersionFour) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4_exact.etree");
+    ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
     ASSERT_TRUE(tree) << tree.error().what;
@@ -209,6 +215,10 @@ TEST(Format, GoldenExactFileOfVersionThree) {
         EXPECT_EQ(tree->triangles(kGoldenSlots[i + 2]).count, kGoldenLeaves[i]);
     }
     EXPECT_EQ(tree->triangles(17).first, 3u);
+    EXPECT_EQ(tree->hull(1), tree->bytes().data() + kEnd + 64);
+    EXPECT_EQ(tree->hull(1)[1], std::byte{141});
+    EXPECT_EQ(tree->hull(1)[48], std::byte{17});
+    EXPECT_EQ(tree->hull(2)[48], std::byte{0});
 }
 
 TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
@@ -220,7 +230,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
         info.exact = true;
         PackedLevel root{{{.triangle_count = 1}}};
         const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
-        EXPECT_EQ(bytes.size(), 256 + 256 + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        EXPECT_EQ(bytes.size(), 256 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
         const auto tree = TreeView::open(bytes);
         ASSERT_TRUE(tree) << tree.error().what;
         EXPECT_EQ(tree->triangle(0), triangle);
@@ -228,8 +238,8 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
     }
 }
 
-TEST(Format, GoldenFileOfVersionThree) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v3.etree");
+TEST(Format, GoldenFileOfVersionFour) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4.etree");
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -361,7 +371,8 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree"}) {
+    for (const char* name :
+         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -459,11 +470,11 @@ TEST(Format, NamesTheFirstOffence) {
         ErrorCode code;
         uint64_t where;
     };
-    const size_t counts = kBlock1 + 152, section = kEnd; // counts of nodes 8 and 9
+    const size_t counts = kBlock1 + 152, section = kGoldenHash; // counts of nodes 8 and 9
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
-        {8, {2}, ErrorCode::bad_file, 8},
-        {8, {4}, ErrorCode::newer_version, 4},
+        {8, {3}, ErrorCode::bad_file, 8},
+        {8, {5}, ErrorCode::newer_version, 5},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -525,17 +536,19 @@ TEST(Format, NamesTheFirstOffence) {
         {kBlocks + 255, {1}, ErrorCode::bad_file, kBlocks + 255},     // reserved
     };
     const Case exact_cases[] = {
-        {12, {1}, ErrorCode::bad_file, 116},                     // triangle counts of a tree without
-        {116, {0}, ErrorCode::bad_file, 116},                    // no vertices
-        {116, {8}, ErrorCode::bad_file, 16},                     // more than the size says
-        {120, {0}, ErrorCode::bad_file, 120},                    // no triangles
-        {124, {0}, ErrorCode::bad_file, 124},                    // no component
-        {124, {8}, ErrorCode::bad_file, 124},                    // more than vertices
-        {counts + 1, {0}, ErrorCode::bad_file, counts + 1},      // a leaf of none
-        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},    // another of none
-        {counts + 1, {130}, ErrorCode::bad_file, kBlock2 + 160}, // one that the next leaf has too
-        {kBlock2 + 154, {130}, ErrorCode::bad_file, 120},        // one more than there are
-        {counts, {131}, ErrorCode::bad_file, kBlock1 + 160},     // an inner node's children as triangles
+        {12, {1}, ErrorCode::bad_file, 116},                                // triangle counts of a tree without
+        {116, {0}, ErrorCode::bad_file, 116},                               // no vertices
+        {116, {8}, ErrorCode::bad_file, 16},                                // more than the size says
+        {120, {0}, ErrorCode::bad_file, 120},                               // no triangles
+        {124, {0}, ErrorCode::bad_file, 124},                               // no component
+        {124, {8}, ErrorCode::bad_file, 124},                               // more than vertices
+        {counts + 1, {0}, ErrorCode::bad_file, counts + 1},                 // a leaf of none
+        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},               // another of none
+        {counts + 1, {130}, ErrorCode::bad_file, kBlock2 + 160},            // one that the next leaf has too
+        {kBlock2 + 154, {130}, ErrorCode::bad_file, 120},                   // one more than there are
+        {counts, {131}, ErrorCode::bad_file, kBlock1 + 160},                // an inner node's children as triangles
+        {kEnd + 64 + 49, {1}, ErrorCode::bad_file, kEnd + 64 + 49},         // reserved bytes of a hull
+        {kEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kEnd + 2 * 64 + 63}, // likewise
         {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
         {section + 8 + 7 * 12 + 2 * 6 + 4, {7}, ErrorCode::bad_file, section + 8 + 7 * 12 + 12}, // no such vertex
     };
@@ -749,7 +762,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 3); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 4); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

@@ -30,6 +30,7 @@ inline constexpr uint32_t kMaxDegree = 64; ///< children per node, at most
 inline constexpr uint32_t kMaxLevels = 32; ///< levels including the root, at most
 inline constexpr uint32_t kBlockLanes = 8; ///< nodes that a block has room for
 inline constexpr size_t kBlockBytes = 256; ///< bytes of one block in the file
+inline constexpr size_t kHullBytes = 64;   ///< bytes of one hull record in the file
 
 /// Triangles in a leaf of an exact tree, at most.
 inline constexpr uint32_t kMaxLeafTriangles = 127;
@@ -143,6 +144,8 @@ public:
     LevelInfo level(uint32_t l) const noexcept;
     /// First slot of level `l` < level_count().
     uint32_t first_slot(uint32_t l) const noexcept;
+    /// The level whose blocks hold slot `slot` < slot_count().
+    uint32_t level_of(uint32_t slot) const noexcept;
     BakeInfo bake_info() const noexcept;
     /// BakeInfo::surface_mode
     bool surface_mode() const noexcept;
@@ -156,9 +159,15 @@ public:
     /// The ellipsoid of `node`, exactly as stored: every float is an integer times a power of two. Here and below, a
     /// node is a slot for which is_node() holds.
     Ellipsoid ellipsoid(uint32_t node) const noexcept;
+    /// ellipsoid(0), which holds everything.
+    const Ellipsoid& root() const noexcept { return root_; }
     /// The children of `node`; none for a leaf, and none for the last level of a prefix.
     ChildRange children(uint32_t node) const noexcept;
     bool is_leaf(uint32_t node) const noexcept { return children(node).count == 0; }
+
+    /// The kHullBytes bytes (src/FORMAT.md) that tell in what polytope the triangles below an inner node lie, if
+    /// has_triangles(): `b` is the block of the node's first child.
+    const std::byte* hull(uint32_t b) const noexcept { return hulls_ + size_t{b} * kHullBytes; }
 
     /// True for an exact tree that is no prefix: each leaf then has 1 ... kMaxLeafTriangles triangles, and each
     /// triangle belongs to one leaf. Without triangles the counts below are 0.
@@ -202,7 +211,9 @@ private:
     }
     std::span<const std::byte> bytes_;
     const std::byte* blocks_ = nullptr;
+    const std::byte* hulls_ = nullptr; // null without triangles
     LatticeInfo lattice_;
+    Ellipsoid root_;
     uint32_t node_count_ = 0;
     uint32_t block_count_ = 0;
     uint32_t level_count_ = 0;
