@@ -83,8 +83,7 @@ public:
     Collector(Descent& descent, bool swapped, const ContactManifolds& last, const RelativePose& to_world)
         : d_(descent), swapped_(swapped), last_(last), closed_a_(closed(descent.a.tree)),
           closed_b_(closed(descent.b.tree)),
-          size_(std::min(place(d_.a.tree.ellipsoid(0)).size, place(d_.b.tree.ellipsoid(0)).size)),
-          patches_(kSamePoint * size_) {
+          size_(std::min(place(d_.a.tree.root()).size, place(d_.b.tree.root()).size)), patches_(kSamePoint * size_) {
         for (uint32_t i = 0; i < std::min(last.count, kManifolds); ++i) {
             const Vec3& n = last.manifolds[i].normal;
             const dvec3 here = dvec3(n.x, n.y, n.z) * to_world.rotation; // the transpose times it

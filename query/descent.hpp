@@ -19,7 +19,7 @@ struct Body {
     uint32_t limit_from;  ///< slots from here on are too deep for QueryOptions::max_level to be opened
     uint32_t deepest = 0; ///< largest slot that was tested
 
-    uint32_t deepest_level() const noexcept;
+    uint32_t deepest_level() const noexcept { return tree.level_of(deepest); }
 };
 
 Body body(const TreeView& tree, uint32_t max_level) noexcept;
@@ -50,8 +50,9 @@ struct Descent {
             QueryContext& context, const QueryOptions& query_options) noexcept
         : Descent(tree_a, tree_b, relative_pose(pose_a, pose_b), context, query_options) {}
 
-    /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query.
-    bool meet(uint32_t node_a, uint32_t node_b) noexcept;
+    /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query. `normal` is 0, or
+    /// of any length, in A's frame, from A to B, and along it they may well be apart.
+    bool meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept;
     /// Takes a pair that meets. True to stop the query.
     bool take(const MeetingPair& pair) noexcept;
     /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any.
@@ -62,7 +63,9 @@ struct Descent {
 
 private:
     template <class Apart> bool parted(Apart&& apart) noexcept;
+    bool apart_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept;
     float least_skin_ = 0;
+    double corners_reach_ = -1; // S of corners.hpp, once it is asked for
 };
 
 /// The descent itself: separated, overlapping (surfaces or leaves), or undecided (out of budget).

@@ -75,7 +75,7 @@ private:
             : blocks(body.tree.block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
               limit_from(body.limit_from), pose(other_to_here), step(power_of_two(step_exponent)),
               per_step(power_of_two(-step_exponent)) {
-            if (body.tree.has_triangles()) triangles = body.tree.triangle_bytes();
+            if (body.tree.has_triangles()) triangles = body.tree.triangle_bytes(), hulls = body.tree.hull(0);
             triangle_bytes = static_cast<uint32_t>(3 * index_bytes(body.tree.vertex_count()));
             std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);
         }
@@ -85,6 +85,7 @@ private:
         int32_t step_exponent;
         uint32_t leaves_from, limit_from, deepest = 0;
         const std::byte* triangles = nullptr;
+        const std::byte* hulls = nullptr;
         uint32_t triangle_bytes;
         const LatticePose& pose;
         double step, per_step;
@@ -215,6 +216,9 @@ private:
         const uint32_t this_leaf = open != 0 ? kLeafB : kLeafA;
         LaneBounds bounds;
         bound_lanes(block, side.step_exponent, one.single, &one.box, q_.enough() * side.per_step, bounds);
+        const Side& there = sides_[open ^ kOpenB];
+        const std::byte* const hull_one =
+            other_leaf != 0 ? nullptr : hull_of(there, there.block(other), other % kBlockLanes);
         const uint32_t nodes = (1u << count) - 1;
         note_skipped(bounds, nodes & ~bounds.near, side);
         for (uint32_t near = bounds.near & nodes; near != 0; near &= near - 1) {
@@ -224,12 +228,22 @@ private:
             const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
             if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
             const uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
-            const double lower = bounds.lower[lane] * side.step; // less than 0: the deeper, the nearer
+            double lower = bounds.lower[lane] * side.step; // less than 0: the deeper, the nearer
+            if (have_hulls_) {
+                lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one,
+                                               leaf ? nullptr : hull_of(side, block, lane));
+                if (skips(lower)) continue;
+            }
             if (count_ == 0 || lower < least_) nearest_ = count_, least_ = lower;
             const float bound = inherit(e.bound, lower);
             const uint32_t node = first + lane;
             children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
         }
+    }
+    // Of an inner node.
+    static const std::byte* hull_of(const Side& side, const std::byte* block, uint32_t lane) {
+        const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
+        return side.hulls != nullptr ? side.hulls + size_t{first / kBlockLanes} * kHullBytes : nullptr;
     }
     static HWY_INLINE void note_skipped(const LaneBounds& bounds, uint32_t lanes, Side& side) {
         if (lanes == 0) return;
@@ -274,6 +288,7 @@ private:
     DistanceSearch& q_;
     PairHeap<> heap_;
     Side sides_[2];
+    const bool have_hulls_ = q_.a.tree.has_triangles() || q_.b.tree.has_triangles();
     double base_ = 0;      // bound of the roots, metres
     uint32_t room_;        // of the heap: what depth_first() needs is kept free
     uint32_t count_ = 0;   // of children_

@@ -29,7 +29,7 @@
 // NaN fails every comparison of the callers.
 //
 // Cost: about 250 vector operations, four square roots and two quotients for eight pairs.
-#include "query/lanes-inl.hpp"
+#include "query/hull_lanes-inl.hpp"
 
 #include <limits>
 
@@ -53,7 +53,11 @@ struct LaneBounds {
     alignas(64) double lower[kBlockLanes];
     alignas(64) float x[kBlockLanes], y[kBlockLanes], z[kBlockLanes]; ///< n, of length 1 but for rounding
     alignas(64) float size[kBlockLanes];                              ///< |L2|
-    uint32_t near;                                                    ///< bit i: lower[i] is not known to be `enough`
+    /// If boxes were given: how far the single reaches along n, and the lane along -n, from their centers; L1^T n and
+    /// L2^T n, and their lengths.
+    alignas(64) float reach_a[kBlockLanes], reach_b[kBlockLanes];
+    alignas(64) float in_a[3][kBlockLanes], in_b[3][kBlockLanes], width_a[kBlockLanes], width_b[kBlockLanes];
+    uint32_t near; ///< bit i: lower[i] is not known to be `enough`
 };
 
 /// Bytes at any address, as floats.
@@ -142,13 +146,19 @@ HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const
         LaneVector n = adjugate_times(mix, r);
         const Lanes scale = hn::Div(set(1), hn::Sqrt(sum_of_squares(n.x, n.y, n.z)));
         n = {hn::Mul(n.x, scale), hn::Mul(n.y, scale), hn::Mul(n.z, scale)};
-        const Lanes width_a = width(one, n), width_b = width(e, n);
+        const LaneVector in_a = transposed_times(one, n), in_b = transposed_times(e, n);
+        const Lanes width_a = length(in_a), width_b = length(in_b);
         if (box != nullptr) {
             const Lanes a =
                 lesser(hn::Add(width_a, hn::Mul(margin, set(one.size))), hn::Add(support(*box, n), set(box->slack)));
             const Lanes b =
                 lesser(hn::Add(width_b, hn::Mul(margin, q.size)), hn::Add(support(boxes, i, e, n), box_slack));
             hn::Store(hn::Add(a, b), d, widths + i);
+            hn::Store(a, d, out.reach_a + i), hn::Store(b, d, out.reach_b + i);
+            hn::Store(in_a.x, d, out.in_a[0] + i), hn::Store(in_a.y, d, out.in_a[1] + i);
+            hn::Store(in_a.z, d, out.in_a[2] + i), hn::Store(in_b.x, d, out.in_b[0] + i);
+            hn::Store(in_b.y, d, out.in_b[1] + i), hn::Store(in_b.z, d, out.in_b[2] + i);
+            hn::Store(width_a, d, out.width_a + i), hn::Store(width_b, d, out.width_b + i);
         } else {
             hn::Store(hn::Add(hn::Add(width_a, width_b), hn::Mul(margin, sizes)), d, widths + i);
         }
@@ -177,6 +187,26 @@ HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const
         hn::StoreMaskBits(w, hn::Not(hn::Ge(lower, hn::Set(w, enough))), bits);
         out.near |= uint32_t{bits[0]} << i;
     }
+}
+
+/// What hulls of the nodes (null: not known) add to a lane's bound along n, steps; never negative. The terms of their
+/// errors are those of hull_lanes-inl.hpp, and of the product above: that factor is at least 1 - 2^-20.
+HWY_INLINE double hulls_add(const LaneBounds& at, uint32_t lane, float size, const std::byte* hull_one,
+                            const std::byte* hull_lane) {
+    const double x = at.x[lane], y = at.y[lane], z = at.z[lane];
+    if (!(x * x + y * y + z * z <= 1 + 0x1p-20)) return 0; // nothing is claimed
+    float saved = 0;
+    if (hull_one != nullptr) {
+        const float reach =
+            hull_reach_here(hull_one, at.in_a[0][lane], at.in_a[1][lane], at.in_a[2][lane], at.width_a[lane]);
+        saved += std::max(0.0f, at.reach_a[lane] - (reach + kLaneMargin * size));
+    }
+    if (hull_lane != nullptr) {
+        const float reach =
+            hull_reach_here(hull_lane, -at.in_b[0][lane], -at.in_b[1][lane], -at.in_b[2][lane], at.width_b[lane]);
+        saved += std::max(0.0f, at.reach_b[lane] - (reach + kLaneMargin * at.size[lane]));
+    }
+    return double{saved} * (1 - 0x1p-20);
 }
 
 /// The same of the ellipsoids alone.

@@ -1,41 +1,16 @@
 // What the float bounds of distance.cpp leave open is decided here, in double precision.
+#include "query/corners.hpp"
 #include "query/distance_search.hpp"
 #include "query/gap.hpp"
 #include "query/triangle_ellipsoid.hpp"
 #include "query/triangle_lanes.hpp"
-#include "src/bytes.hpp"
-#include "src/layout.hpp"
 
 #include <glm/geometric.hpp>
 
 #include <cmath>
 
 namespace prolate::query {
-namespace {
-
 using glm::dvec3;
-
-// The greatest n.x of the corners x of some triangles.
-template <class Index> double support(const TreeView& tree, const TriangleRange& range, const dvec3& n) {
-    const std::byte* index = tree.triangle_bytes() + size_t{range.first} * 3 * sizeof(Index);
-    double most = -DistanceSearch::kInfinity;
-    for (uint32_t i = 0; i < 3 * range.count; ++i, index += sizeof(Index)) {
-        const std::byte* const x = tree.vertex_bytes() + size_t{load_le<Index>(index)} * kVertexBytes;
-        const auto at = [x](size_t k) { return double{load_le<float>(x + k * sizeof(float))}; };
-        most = std::max(most, (n.x * at(0) + n.y * at(1)) + n.z * at(2));
-    }
-    return most;
-}
-double support(const TreeView& tree, const TriangleRange& range, const dvec3& n) {
-    return tree.vertex_count() <= 0x10000 ? support<uint16_t>(tree, range, n) : support<uint32_t>(tree, range, n);
-}
-
-// Bounds the distance of an exact tree's corners from its origin: they lie in the root.
-double reach_of_corners(const TreeView& tree) {
-    return place(tree.ellipsoid(0)).reach;
-}
-
-} // namespace
 
 DistanceSearch::DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
                                QueryContext& context, const DistanceOptions& distance_options) noexcept
@@ -45,7 +20,7 @@ DistanceSearch::DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const
       entries(context.entries), corners_reach_(reach_of_corners(tree_a) + reach_of_corners(tree_b) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
-    const PlacedEllipsoid x = place(search.a.tree.ellipsoid(0)), y = place(search.b.tree.ellipsoid(0), search.b_to_a);
+    const PlacedEllipsoid x = place(search.a.tree.root()), y = place(search.b.tree.root(), search.b_to_a);
     const double bound = glm::length(y.center - x.center) - x.size - y.size - kSeparationMargin * (x.reach + y.reach);
     return bound > 0 ? bound : 0;
 }
@@ -86,13 +61,12 @@ void DistanceSearch::decide(uint32_t node_a, uint32_t node_b) noexcept {
     }
 }
 
-// A lower bound from `normal`. The terms of triangle.hpp: there B's corners are turned, here the direction, with the
-// same error.
+// A lower bound from `normal`.
 double DistanceSearch::gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a,
                                         TriangleRange in_b) noexcept {
     const auto kept = [](Supports& supports, const TreeView& tree, uint32_t leaf, TriangleRange range, const dvec3& n) {
         Support& at = supports[leaf % supports.size()];
-        if (at.leaf != leaf) at = {leaf, support(tree, range, n)};
+        if (at.leaf != leaf) at = {leaf, support_of_corners(tree, range, n)};
         return at.reach;
     };
     const double gap = (glm::dot(normal, b_to_a.translation) - kept(supports_b_, b.tree, node_b, in_b, -normal_b)) -

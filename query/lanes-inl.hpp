@@ -317,29 +317,38 @@ HWY_INLINE LaneShapes mixed(const LaneShapes& q, Lanes w1, Lanes w2, const Singl
             mix(s.off_diagonal[0], q.xy),
             q.size};
 }
-/// a = |L1^T n|.
-HWY_INLINE Lanes width(const Single& s, const LaneVector& n) {
+HWY_INLINE Lanes length(const LaneVector& v) {
+    return hn::Sqrt(sum_of_squares(v.x, v.y, v.z));
+}
+/// L1^T n.
+HWY_INLINE LaneVector transposed_times(const Single& s, const LaneVector& n) {
     const auto along = [&](size_t column) {
         const LaneTag d;
         return dot(hn::Set(d, s.factor[column][0]), hn::Set(d, s.factor[column][1]), hn::Set(d, s.factor[column][2]),
                    n.x, n.y, n.z);
     };
-    return hn::Sqrt(sum_of_squares(along(0), along(1), along(2)));
+    return {along(0), along(1), along(2)};
 }
-/// b = |L2^T n|.
-HWY_INLINE Lanes width(const LaneNodes& e, const LaneVector& n) {
-    const Lanes second = hn::Add(hn::Mul(e.l22, n.y), hn::Mul(e.l32, n.z));
-    return hn::Sqrt(sum_of_squares(dot(e.l11, e.l21, e.l31, n.x, n.y, n.z), second, hn::Mul(e.l33, n.z)));
+/// L2^T n.
+HWY_INLINE LaneVector transposed_times(const LaneNodes& e, const LaneVector& n) {
+    return {dot(e.l11, e.l21, e.l31, n.x, n.y, n.z), hn::Add(hn::Mul(e.l22, n.y), hn::Mul(e.l32, n.z)),
+            hn::Mul(e.l33, n.z)};
+}
+
+/// How far an ellipsoid reaches along n from its center: a = |L1^T n|, or b = |L2^T n|.
+template <class E> HWY_INLINE Lanes width(const E& e, const LaneVector& n) {
+    return length(transposed_times(e, n));
 }
 
 /// The terms of (1) for one direction in each lane.
 struct LaneTerms {
     Lanes p, a, b;
-    Lanes length;  ///< |n|_1
-    Lanes x, y, z; ///< n
-    Lanes size;    ///< |L2|
-    Lanes gap;     ///< p - a - b less the margin
-    Lanes sum;     ///< a + b
+    Lanes length;          ///< |n|_1
+    Lanes x, y, z;         ///< n
+    Lanes size;            ///< |L2|
+    Lanes gap;             ///< p - a - b less the margin
+    Lanes sum;             ///< a + b
+    LaneVector in_a, in_b; ///< L1^T n, L2^T n: a and b are their lengths
 };
 
 HWY_INLINE LaneTerms evaluate(const LaneNodes& e, const Single& s) {
@@ -351,7 +360,8 @@ HWY_INLINE LaneTerms evaluate(const LaneNodes& e, const Single& s) {
     LaneTerms t;
     t.x = n.x, t.y = n.y, t.z = n.z;
     t.size = q.size;
-    t.a = width(s, n), t.b = width(e, n);
+    t.in_a = transposed_times(s, n), t.in_b = transposed_times(e, n);
+    t.a = length(t.in_a), t.b = length(t.in_b);
     t.p = dot(n.x, n.y, n.z, r.x, r.y, r.z);
     t.sum = hn::Add(t.a, t.b);
     t.length = hn::Add(hn::Add(hn::Abs(n.x), hn::Abs(n.y)), hn::Abs(n.z));

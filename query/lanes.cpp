@@ -150,4 +150,16 @@ LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, c
     return out;
 }
 
+float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept {
+    float most = -HUGE_VALF;
+    for (size_t i = 0; i < kHullPoints; ++i) {
+        const auto along = [&](size_t k) {
+            return static_cast<float>(load_le<int8_t>(hull + kHullPoint + kHullPoints * k + i)) * v[k];
+        };
+        most = std::max(most, along(0) + along(1) + along(2));
+    }
+    const auto share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
+    return share > 0 ? most * kPerHullUnit + share * kPerHullShare * width : width;
+}
+
 } // namespace prolate::query

@@ -5,6 +5,7 @@
 #include "query/lattice.hpp"
 #include "src/block.hpp"
 #include "src/bytes.hpp"
+#include "src/hull.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -16,13 +17,16 @@ namespace prolate::query {
 
 inline constexpr float kLaneMargin = 0x1p-19f;    ///< 32 u, u = 2^-24: see lanes-inl.hpp
 inline constexpr float kLaneDirection = 0x1p-60f; ///< least |n|_1 of a direction that may separate
-/// Exponents of factors are clamped from below: an ellipsoid too thin for single precision grows. No builder comes
-/// near.
+/// Exponents of factors are clamped from below: an ellipsoid too thin for single precision grows, and its hull with it,
+/// about a center that lies in it. No builder comes near.
 inline constexpr int32_t kLowestExponent = -60, kHighestExponent = 100;
 /// Bounds the length of a stored center, lattice steps.
 inline constexpr float kLargestCenter = 113512;
 /// 8 u: half a box's width grows by this share of the length of the box's center, and by kBoxSlack = 2^16 kBoxMargin.
 inline constexpr float kBoxMargin = 0x1p-21f, kBoxSlack = 0x1p-5f;
+/// What a hull record's integers count.
+inline constexpr auto kPerHullUnit = static_cast<float>(1 / kHullUnit),
+                      kPerHullShare = static_cast<float>(1 / kHullShares);
 /// Turns truncation into rounding up, or down by at most 2^-10.
 inline constexpr float kAlmostOne = 1 - 0x1p-10f;
 
@@ -92,5 +96,9 @@ struct LaneGap {
     float size;   ///< |L2|
 };
 LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& single) noexcept;
+
+/// How far what a hull record (src/hull.hpp) describes reaches from its node's center along n: v = L^T n, width = |v|.
+/// If the record knows nothing, `width`.
+float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept;
 
 } // namespace prolate::query

@@ -1,9 +1,12 @@
 // What the descent's float tests leave open is decided here, in double precision.
+#include "query/corners.hpp"
 #include "query/descent.hpp"
 #include "query/gap.hpp"
 #include "query/triangle.hpp"
 #include "query/triangle_ellipsoid.hpp"
 #include "query/triangle_lanes.hpp"
+
+#include <glm/geometric.hpp>
 
 namespace prolate::query {
 namespace {
@@ -20,12 +23,6 @@ Body body(const TreeView& tree, uint32_t max_level) noexcept {
     const uint32_t last = tree.level_count() - 1;
     const uint32_t limit = max_level < last ? tree.first_slot(max_level) : UINT32_MAX;
     return {tree, tree.lattice(), tree.first_slot(last), limit};
-}
-
-uint32_t Body::deepest_level() const noexcept {
-    uint32_t level = 0;
-    while (level + 1 < tree.level_count() && deepest >= tree.first_slot(level + 1)) ++level;
-    return level;
 }
 
 Descent::Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, QueryContext& context,
@@ -56,7 +53,16 @@ bool Descent::take(const MeetingPair& pair) noexcept {
     return !all;
 }
 
-bool Descent::meet(uint32_t node_a, uint32_t node_b) noexcept {
+// Are the triangles farther apart than margin + skin, as seen along this direction?
+bool Descent::apart_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept {
+    if (corners_reach_ < 0) corners_reach_ = reach_of_corners(a.tree) + reach_of_corners(b.tree) + b_to_a.distance;
+    const glm::dvec3 n = normal / glm::length(normal);
+    const double room = glm::dot(n, b_to_a.translation) - support_of_corners(a.tree, in_a, n);
+    return room - support_of_corners(b.tree, in_b, -(n * b_to_a.rotation)) >
+           double{options.margin} + skin + kSeparationMargin * corners_reach_;
+}
+
+bool Descent::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept {
     const TriangleRange in_a = a.tree.triangles(node_a), in_b = b.tree.triangles(node_b);
     if (in_a.count == 0 && in_b.count == 0)
         return meets({node_a, node_b, kNoTriangle, kNoTriangle}) && take({node_a, node_b, kNoTriangle, kNoTriangle});
@@ -68,6 +74,10 @@ bool Descent::meet(uint32_t node_a, uint32_t node_b) noexcept {
     if (in_b.count == 0) {
         for (uint32_t t = in_a.first; t < in_a.first + in_a.count; ++t)
             if (meets({node_a, node_b, t, kNoTriangle}) && take({node_a, node_b, t, kNoTriangle})) return true;
+        return false;
+    }
+    if (normal != glm::dvec3(0) && apart_along(normal, in_a, in_b)) {
+        ++stats.triangle_tests;
         return false;
     }
     LeafResult first;

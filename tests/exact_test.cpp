@@ -3,6 +3,8 @@
 #include "query/triangle.hpp"
 #include "src/block.hpp"
 #include "src/bytes.hpp"
+#include "src/format.hpp"
+#include "src/hull.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
@@ -278,6 +280,108 @@ TEST(ExactTree, TheProofNoticesNodesThatDoNotHoldTheirTriangles) {
     }
 }
 
+// How far a node's hull reaches along d, in double: src/FORMAT.md.
+double reach(const TreeView& tree, uint32_t node, const std::byte* hull, const Point& d) {
+    const Ellipsoid e = tree.ellipsoid(node);
+    const double v[] = {e.l11 * d[0] + e.l21 * d[1] + e.l31 * d[2], e.l22 * d[1] + e.l32 * d[2], e.l33 * d[2]};
+    double most = -HUGE_VAL;
+    for (size_t i = 0; i < kHullPoints; ++i) {
+        double along = 0;
+        for (size_t k = 0; k < 3; ++k)
+            along += v[k] * load_le<int8_t>(hull + kHullPoint + kHullPoints * k + i) / kHullUnit;
+        most = std::max(most, along);
+    }
+    return e.center.x * d[0] + e.center.y * d[1] + e.center.z * d[2] + most +
+           load_le<uint8_t>(hull + kHullShare) / kHullShares * std::hypot(v[0], v[1], v[2]);
+}
+
+TEST_P(ExactTreeOf, HullsReachAsFarAsTheirTriangles) {
+    scenes::Random random(3);
+    for (const auto& [degree, leaf] : {std::pair{8u, 4u}, {2u, 1u}, {64u, 127u}}) {
+        BuildOptions options;
+        options.degree = degree, options.leaf_triangles = leaf;
+        const Build built = must_build(GetParam().mesh, options);
+        const TreeView tree = built.tree.view();
+        uint32_t known = 0;
+        const auto corners = [&](const auto& self, uint32_t node, const auto& visit) -> void {
+            const TriangleRange range = tree.triangles(node);
+            for (uint32_t t = range.first; t < range.first + range.count; ++t)
+                for (const uint32_t corner : tree.triangle(t)) visit(tree.vertex(corner));
+            const ChildRange children = tree.children(node);
+            for (uint32_t i = 0; i < children.count; ++i) self(self, children.first + i, visit);
+        };
+        tree.for_each_node([&](uint32_t node) {
+            const ChildRange children = tree.children(node);
+            if (children.count == 0) return;
+            const std::byte* const hull = tree.hull(children.first / kBlockLanes);
+            if (hull[kHullShare] == std::byte{0}) return;
+            ++known;
+            for (int i = 0; i < 20; ++i) {
+                const Point d = random.direction();
+                double most = -HUGE_VAL;
+                corners(corners, node,
+                        [&](const Vec3& v) { most = std::max(most, v.x * d[0] + v.y * d[1] + v.z * d[2]); });
+                const Ellipsoid e = tree.ellipsoid(node);
+                const double size = std::hypot(e.center.x, e.center.y, e.center.z) + std::hypot(e.l11, e.l22, e.l33);
+                ASSERT_LE(most, reach(tree, node, hull, d) + 1e-15 * size) << "node " << node;
+            }
+        });
+        EXPECT_TRUE(known > 0 || tree.level_count() == 1);
+    }
+}
+
+TEST(ExactTree, HullsAreClose) {
+    const Build built = must_build(shapes::torus(1, 0.3f, 48, 24));
+    const TreeView tree = built.tree.view();
+    std::vector<int> shares;
+    tree.for_each_node([&](uint32_t node) {
+        const ChildRange children = tree.children(node);
+        if (children.count > 0)
+            shares.push_back(std::to_integer<int>(tree.hull(children.first / kBlockLanes)[kHullShare]));
+    });
+    std::sort(shares.begin(), shares.end());
+    EXPECT_GT(shares.front(), 0); // something is known of all nodes
+    EXPECT_LT(shares[shares.size() / 2], 0.05 * kHullShares);
+    EXPECT_LT(shares.back(), 0.3 * kHullShares);
+}
+
+// The bytes of the tree with half the share in the hull of `node`, or with no points but the center.
+std::vector<std::byte> with_bad_hull(const Tree& tree, uint32_t node, bool half) {
+    const TreeView view = tree.view();
+    const std::byte* const from = view.hull(0);
+    std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
+    std::vector<std::byte> hulls(from, from + view.block_count() * kHullBytes);
+    std::byte* const hull = hulls.data() + size_t{view.children(node).first / kBlockLanes} * kHullBytes;
+    if (half)
+        hull[kHullShare] = std::byte(std::to_integer<unsigned>(hull[kHullShare]) / 2);
+    else
+        std::fill_n(hull, kHullShare, std::byte{0});
+    format::store_hulls(bytes, hulls);
+    return bytes;
+}
+
+TEST(ExactTree, TheProofNoticesAHullThatIsTooSmall) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
+    const Build built = must_build(mesh);
+    const TreeView tree = built.tree.view();
+    for (uint32_t l = 0; l + 1 < tree.level_count(); ++l) {
+        uint32_t node = UINT32_MAX;
+        tree.for_each_node(l, [&](uint32_t n) {
+            if (!tree.is_leaf(n)) node = n;
+        });
+        for (const bool half : {false, true}) {
+            if (half && l > 0) continue; // there the share is mostly what rounding up has added
+            const auto bytes = with_bad_hull(built.tree, node, half);
+            const auto bad = TreeView::open(bytes);
+            ASSERT_TRUE(bad) << bad.error().what;
+            const auto proof = verify(*bad, mesh.view());
+            ASSERT_TRUE(proof);
+            EXPECT_FALSE(proof->covered);
+            EXPECT_FALSE(proof->levels[l].covered);
+        }
+    }
+}
+
 TEST(ExactTree, APrefixCoversTheSurface) {
     const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
     const Build built = must_build(mesh);
@@ -410,6 +514,36 @@ TEST(ExactQuery, AgreesWithBruteForceNearContact) {
             }
     EXPECT_GT(apart, 400u);
     EXPECT_GT(meeting, 400u);
+}
+
+// That the test above would notice hulls that are too small.
+TEST(ExactQueryHarness, CatchesHullsThatAreTooSmall) {
+    const Body a(shapes::icosphere(2)), b(shapes::torus(1, 0.3f, 20, 10));
+    const TreeView sound = a.built.tree.view();
+    const std::byte* const from = sound.hull(0);
+    std::vector<std::byte> bytes(a.built.tree.bytes().begin(), a.built.tree.bytes().end());
+    std::vector<std::byte> hulls(from, from + sound.block_count() * kHullBytes);
+    for (size_t i = 0; i < hulls.size(); i += kHullBytes) // 0.7 of what they were
+        for (size_t k = 0; k < kHullShare; ++k) {
+            auto& q = hulls[i + k];
+            q = static_cast<std::byte>(static_cast<uint8_t>(static_cast<int8_t>(0.7 * std::to_integer<int8_t>(q))));
+        }
+    format::store_hulls(bytes, hulls);
+    const TreeView small = *TreeView::open(bytes);
+    scenes::Random random(6);
+    QueryContext context;
+    uint32_t wrong = 0;
+    for (int i = 0; i < 200; ++i) {
+        const Query start = between(random);
+        double near = 0, far = 1;
+        for (int step = 0; step < 22; ++step) {
+            const double middle = (near + far) / 2;
+            (ask(a.built, b.built, at(start, middle)).verdict == Verdict::separated ? near : far) = middle;
+        }
+        const Query q = at(start, far + 1e-3);
+        wrong += collide(small, q.a, b.built.tree.view(), q.b, context).verdict == Verdict::separated;
+    }
+    EXPECT_GT(wrong, 0u);
 }
 
 // Bodies that drift past each other, some of them through each other.

@@ -6,7 +6,7 @@
 
 #include <hwy/foreach_target.h>
 
-#include "query/lanes-inl.hpp"
+#include "query/hull_lanes-inl.hpp"
 
 #include "src/bytes.hpp"
 #include "tests/hunt.hpp"
@@ -43,6 +43,10 @@ uint32_t box_bits(const std::byte* block, const Single& single, float margin) {
     return boxes_meet(block, single, margin);
 }
 
+float reach_here(const std::byte* hull, float x, float y, float z, float width) {
+    return hull_reach_here(hull, x, y, z, width);
+}
+
 } // namespace prolate::query::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -50,6 +54,7 @@ HWY_AFTER_NAMESPACE();
 namespace prolate::query {
 HWY_EXPORT(lane_gaps);
 HWY_EXPORT(box_bits);
+HWY_EXPORT(reach_here);
 
 namespace {
 
@@ -227,6 +232,24 @@ TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarTwin) {
                             same(twin.size, out[lane].size) && (twin.gap == 0 || same(twin.gap, out[lane].gap)))
                     << target << " lane " << lane;
             }
+        });
+    }
+}
+
+TEST(Lanes, AllTargetsGiveTheHullReachOfTheScalarTwin) {
+    Random random(8);
+    for (uint32_t n = 0; n < 4000; ++n) {
+        std::array<std::byte, kHullBytes> hull;
+        for (auto& byte : hull) byte = static_cast<std::byte>(random.below(256));
+        if (n % 4 == 0) hull[kHullShare] = std::byte{0};
+        float v[3];
+        for (float& x : v) x = static_cast<float>(random.in(-1, 1) * random.log_in(1e-6, 1e6));
+        const auto width = static_cast<float>(hunt::length({v[0], v[1], v[2]}));
+        const float twin = hull_reach(hull.data(), v, width);
+        EXPECT_TRUE(n % 4 != 0 || twin == width);
+        targets::for_each([&](const char* target) {
+            const float reach = HWY_DYNAMIC_DISPATCH(reach_here)(hull.data(), v[0], v[1], v[2], width);
+            ASSERT_EQ(std::bit_cast<uint32_t>(reach), std::bit_cast<uint32_t>(twin)) << target;
         });
     }
 }
