@@ -222,8 +222,12 @@ private:
     // Quantised nodes, breadth-first, each enlarged until its decoded ellipsoid covers.
     Result<void> pack(const Grown& grown, const Pieces& pieces, std::vector<format::PackedLevel>& levels) {
         Box centers;
-        for (const GrownNode& node : grown.nodes) centers.add(node.fit.center);
-        lattice_ = format::lattice_for(centers.low.data(), centers.high.data());
+        double size = 0;
+        for (const GrownNode& node : grown.nodes) {
+            centers.add(node.fit.center);
+            size = std::max(size, node.fit.half_extents().maxCoeff());
+        }
+        lattice_ = format::lattice_for(centers.low.data(), centers.high.data(), size);
         surface_errors_.resize(grown.nodes.size());
         std::vector<uint32_t> current{0};
         while (!current.empty()) {

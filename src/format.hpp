@@ -33,9 +33,10 @@ struct PackedNode {
     uint8_t triangle_count = 0; // of a leaf of an exact tree
 };
 
-/// Lattice for centers inside the box [low, high], all finite: the finest step for which 16 bits reach across and a
-/// float holds every center exactly.
-Lattice lattice_for(const double low[3], const double high[3]) noexcept;
+/// Lattice for centers inside the box [low, high], all finite: the finest step for which 16 bits reach across, a float
+/// holds every center exactly, and `size`, the largest half extent of a node, takes at most 2^20 steps. So nodes whose
+/// centers all but coincide, and their boxes, keep within what single precision holds.
+Lattice lattice_for(const double low[3], const double high[3], double size = 0) noexcept;
 
 /// Nearest representable node to {center + L u}; child fields are left alone. `factor` = l11, l21, l22, l31, l32, l33.
 /// Components beyond the lattice are clamped to its border.

@@ -11,14 +11,15 @@
 
 namespace prolate::format {
 
-Lattice lattice_for(const double low[3], const double high[3]) noexcept {
+Lattice lattice_for(const double low[3], const double high[3], double size) noexcept {
     double extent = 0, reach = 0;
     for (int i = 0; i < 3; ++i) {
         extent = std::max(extent, high[i] - low[i]);
         reach = std::max({reach, std::abs(low[i]), std::abs(high[i])});
     }
     // The smallest step for which the box spans fewer than 2^16 - 2 steps and lies within 2^24 - 2^17 steps of zero.
-    const double needed = std::max(extent / (UINT16_MAX - 2.0), reach / (kMaxCoordinate - 2.0 * UINT16_MAX));
+    const double needed =
+        std::max({extent / (UINT16_MAX - 2.0), reach / (kMaxCoordinate - 2.0 * UINT16_MAX), size * 0x1p-20});
     int exponent = kMinStepExponent;
     if (needed > 0) exponent = std::clamp(std::ilogb(needed) + 1, kMinStepExponent, kMaxStepExponent);
     Lattice lattice;

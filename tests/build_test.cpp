@@ -3,6 +3,8 @@
 #include "builder/fit.hpp"
 #include "builder/random.hpp"
 #include "builder/winding.hpp"
+#include "src/block.hpp"
+#include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "src/hash.hpp"
 #include "tests/shapes.hpp"
@@ -265,15 +267,41 @@ TEST(Build, FiguresAreThoseOfTheFile) {
                 built.levels[0].outside_ratio_error);
 }
 
+// One sphere around a cube about the origin: its center is 0, up to rounding, and says nothing of a lattice.
+TEST(Build, ABoxHoldsItsNodeEvenIfAllCentersCoincide) {
+    for (const Primitive primitive : {Primitive::ellipsoid, Primitive::sphere}) {
+        BuildOptions options;
+        options.quality = Quality::fast, options.ellipsoids = 1, options.primitive = primitive;
+        const Build built = must_build(shapes::box(1, 1, 1), options);
+        const TreeView tree = built.tree.view();
+        const LatticeInfo lattice = tree.lattice();
+        const Ellipsoid e = tree.ellipsoid(0);
+        const double center[] = {e.center.x, e.center.y, e.center.z};
+        const double half[] = {e.l11, std::hypot(e.l21, e.l22), std::hypot(e.l31, e.l32, e.l33)};
+        const std::byte* const block = tree.block(0);
+        for (size_t i = 0; i < 3; ++i) {
+            EXPECT_LT(std::ldexp(half[i], -lattice.step_exponent), 0x1p21);
+            const double origin = double(lattice.origin[i]) + load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
+            const double step = std::ldexp(1.0, load_le<uint8_t>(block + kBlockBoxExponent + i));
+            const auto side = [&](size_t array) {
+                return std::ldexp(origin + step * load_le<uint8_t>(block + array + kBlockLanes * i),
+                                  lattice.step_exponent);
+            };
+            EXPECT_LE(side(kBlockBoxLow), center[i] - half[i]);
+            EXPECT_GE(side(kBlockBoxHigh), center[i] + half[i]);
+        }
+    }
+}
+
 // If this fails because the algorithm has changed: increment kBuilderVersion and put the new hash here. Caches take
 // equal versions for equal bytes.
 TEST(Build, BytesChangeOnlyWithTheBuildersVersion) {
     const Build built = must_build(shapes::torus(1, 0.3f, 24, 12), quick(1));
-    EXPECT_EQ(kBuilderVersion, 7u);
-    EXPECT_EQ(hash_bytes(built.tree.bytes()), 14131643656689715096u);
+    EXPECT_EQ(kBuilderVersion, 8u);
+    EXPECT_EQ(hash_bytes(built.tree.bytes()), 8804140650389329756u);
     BuildOptions exact;
     exact.exact = true;
-    EXPECT_EQ(hash_bytes(must_build(shapes::torus(1, 0.3f, 24, 12), exact).tree.bytes()), 15395787880936989622u);
+    EXPECT_EQ(hash_bytes(must_build(shapes::torus(1, 0.3f, 24, 12), exact).tree.bytes()), 6016619698416112233u);
 }
 
 TEST(Build, CountsAreExact) {

@@ -35,7 +35,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
 /// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
-inline constexpr uint32_t kBuilderVersion = 7;
+inline constexpr uint32_t kBuilderVersion = 8;
 
 /// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
 /// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
