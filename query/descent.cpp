@@ -130,10 +130,9 @@ private:
     HWY_NOINLINE bool hulls_part(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
         const auto reach = [](const Side& side, uint32_t slot, float x, float y, float z, float width) {
             const std::byte* const block = side.block(slot);
-            if (side.hulls == nullptr || load_le<uint8_t>(block + kBlockCount + slot % kBlockLanes) >= kTriangleLeaf)
-                return width;
-            const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * (slot % kBlockLanes));
-            return hull_reach_here(side.hulls + size_t{first / kBlockLanes} * kHullBytes, x, y, z, width);
+            const uint32_t at = slot % kBlockLanes;
+            if (side.hulls == nullptr || load_le<uint8_t>(block + kBlockCount + at) >= kTriangleLeaf) return width;
+            return hull_reach_here(hull_of(side.hulls, block, at), x, y, z, width);
         };
         const float a = kept.a[lane], b = kept.b[lane];
         const float reach_a =

@@ -218,32 +218,27 @@ private:
         bound_lanes(block, side.step_exponent, one.single, &one.box, q_.enough() * side.per_step, bounds);
         const Side& there = sides_[open ^ kOpenB];
         const std::byte* const hull_one =
-            other_leaf != 0 ? nullptr : hull_of(there, there.block(other), other % kBlockLanes);
+            other_leaf != 0 ? nullptr : hull_of(there.hulls, there.block(other), other % kBlockLanes);
         const uint32_t nodes = (1u << count) - 1;
         note_skipped(bounds, nodes & ~bounds.near, side);
         for (uint32_t near = bounds.near & nodes; near != 0; near &= near - 1) {
             const auto lane = static_cast<uint32_t>(std::countr_zero(near));
             const auto stored = static_cast<uint8_t>(block[kBlockCount + lane]);
             const bool leaf = first >= side.leaves_from || stored == 0 || stored >= kTriangleLeaf;
-            const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
-            if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
-            const uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
             double lower = bounds.lower[lane] * side.step; // less than 0: the deeper, the nearer
             if (have_hulls_) {
                 lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one,
-                                               leaf ? nullptr : hull_of(side, block, lane));
+                                               leaf ? nullptr : hull_of(side.hulls, block, lane));
                 if (skips(lower)) continue;
             }
+            const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
+            if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
+            const uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
             if (count_ == 0 || lower < least_) nearest_ = count_, least_ = lower;
             const float bound = inherit(e.bound, lower);
             const uint32_t node = first + lane;
             children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
         }
-    }
-    // Of an inner node.
-    static const std::byte* hull_of(const Side& side, const std::byte* block, uint32_t lane) {
-        const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
-        return side.hulls != nullptr ? side.hulls + size_t{first / kBlockLanes} * kHullBytes : nullptr;
     }
     static HWY_INLINE void note_skipped(const LaneBounds& bounds, uint32_t lanes, Side& side) {
         if (lanes == 0) return;

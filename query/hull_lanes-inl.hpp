@@ -5,9 +5,8 @@
 // With the terms of lanes-inl.hpp the nodes are apart if
 //     p - A - B > 0,   A = max v.w_i + share |v|, v = L1^T n,   B likewise with v = -L2^T n
 // for what the two hulls reach from their ellipsoids' centers: A <= a and B <= b but for rounding. |w| <= 1, so
-//   A         v is wrong by 14 u |n| |L1| as in a; 3 products, 2 sums, two factors rounded, their product, the last
-//   sum:
-//             12 u |n| |L1|; B likewise
+//   A         v is wrong by 14 u |n| |L1| as in a; 3 products and 2 sums, two rounded factors, their products and the
+//             last sum add 12 u |n| |L1|; B likewise
 //   gap + (a - A) + (b - B)      4 u |n| (|r| + |L1| + |L2|)
 // which the margin in `gap`, 32 u of each, pays for. The share of the ellipsoid is rounded up, and the points as stored
 // are exact: the builder measures what sticks out of their hull.

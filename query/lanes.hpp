@@ -97,6 +97,11 @@ struct LaneGap {
 };
 LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& single) noexcept;
 
+/// The record of the inner node in `lane` of `block`, of those that begin at `hulls`; null if that is.
+inline const std::byte* hull_of(const std::byte* hulls, const std::byte* block, uint32_t lane) {
+    const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
+    return hulls != nullptr ? hulls + size_t{first / kBlockLanes} * kHullBytes : nullptr;
+}
 /// How far what a hull record (src/hull.hpp) describes reaches from its node's center along n: v = L^T n, width = |v|.
 /// If the record knows nothing, `width`.
 float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept;
