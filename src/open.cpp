@@ -130,8 +130,8 @@ Result<Levels> check_levels(std::span<const std::byte> bytes, uint32_t level_cou
 // has one parent, before it, and each triangle one leaf.
 class NodeCheck {
 public:
-    NodeCheck(const std::byte* file, size_t first_block, uint32_t degree, bool exact)
-        : file_(file), first_block_(first_block), degree_(degree), exact_(exact) {}
+    NodeCheck(const std::byte* file, size_t first_block, uint32_t degree, bool exact, int32_t step_exponent)
+        : file_(file), first_block_(first_block), degree_(degree), exact_(exact), step_exponent_(step_exponent) {}
 
     // The next level's blocks begin at block `end` of the tree.
     void begin_level(uint32_t end) { children_ = 0, level_end_ = next_child_block_ = end; }
@@ -177,6 +177,8 @@ private:
         const auto exponent = load_le<int8_t>(from + at_size);
         if (exponent < format::kMinNodeExponent || exponent > format::kMaxNodeExponent)
             return bad("node size out of range", block + at_size);
+        if (exponent - step_exponent_ > kMaxNodeSize)
+            return bad("a node is too large for the lattice's step", block + at_size);
         for (size_t i = 0; i < 3; ++i)
             if (const size_t here = block_offset(kBlockDiagonal, i, lane); load_le<uint16_t>(from + here) == 0)
                 return bad("a node has no extent", block + here);
@@ -223,6 +225,7 @@ private:
     const size_t first_block_;
     const uint32_t degree_;
     const bool exact_;
+    const int32_t step_exponent_;
     uint32_t block_ = 0; // of the next family
     uint64_t level_end_ = 0, next_child_block_ = 0;
     uint64_t children_ = 0, next_triangle_ = 0;
@@ -267,7 +270,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.is_prefix_ = bytes.size() < total;
     for (size_t i = 0; i < 3; ++i) view.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
     view.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
-    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact);
+    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, view.lattice_.step_exponent);
     for (uint32_t l = 0; l < present; ++l) {
         const LevelInfo level = view.level(l);
         view.node_count_ += level.node_count;

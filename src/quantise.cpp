@@ -55,7 +55,7 @@ void quantise(PackedNode& node, const Lattice& lattice, const double center[3], 
 void store_boxes(std::byte* block, std::span<const PackedNode> siblings, const Lattice& lattice) noexcept {
     assert(siblings.size() <= kBlockLanes);
     constexpr double kSlack = 0x1p-16;             // far above the rounding of a lattice coordinate
-    constexpr double kLargest = kMaxBoxOrigin - 1; // keeps the numbers in range, whatever the node
+    constexpr double kLargest = kMaxBoxOrigin - 1; // no node that open() admits reaches it
     double low[kBlockLanes][3], high[kBlockLanes][3];
     for (size_t lane = 0; lane < siblings.size(); ++lane) {
         const PackedNode& node = siblings[lane];

@@ -474,6 +474,8 @@ TEST(Format, NamesTheFirstOffence) {
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
         {8, {3}, ErrorCode::bad_file, 8},
+        {kBlocks + 144, {19}, ErrorCode::bad_file, kBlocks + 144},         // 23 above the step exponent, -4
+        {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
         {8, {5}, ErrorCode::newer_version, 5},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
