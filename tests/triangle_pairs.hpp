@@ -25,7 +25,7 @@ inline std::vector<std::byte> leaf_of(const std::vector<Vec3>& vertices, const s
     format::PackedNode node{.diagonal = {60000, 60000, 60000}, .exponent = 40};
     node.triangle_count = static_cast<uint8_t>(triangles.size());
     const format::PackedLevel root{{node}};
-    return format::encode(info, 2, {}, std::span(&root, 1), {vertices, triangles, 1});
+    return format::encode(info, 2, {.step_exponent = 24}, std::span(&root, 1), {vertices, triangles, 1});
 }
 
 using Corners = std::array<Vec3, 3>;
