@@ -20,6 +20,8 @@ struct Body {
     uint32_t deepest = 0; ///< largest slot that was tested
 
     uint32_t deepest_level() const noexcept { return tree.level_of(deepest); }
+    /// The block that holds a slot, as queries take it.
+    const std::byte* block(uint32_t slot) const noexcept { return tree.bounding_block(slot / kBlockLanes); }
 };
 
 Body body(const TreeView& tree, uint32_t max_level) noexcept;

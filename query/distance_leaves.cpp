@@ -20,7 +20,7 @@ DistanceSearch::DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const
       entries(context.entries), corners_reach_(reach_of_corners(tree_a) + reach_of_corners(tree_b) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
-    const PlacedEllipsoid x = place(search.a.tree.root()), y = place(search.b.tree.root(), search.b_to_a);
+    const PlacedEllipsoid x = place(search.a.tree.bound(0)), y = place(search.b.tree.bound(0), search.b_to_a);
     const double bound = glm::length(y.center - x.center) - x.size - y.size - kSeparationMargin * (x.reach + y.reach);
     return bound > 0 ? bound : 0;
 }
@@ -54,7 +54,7 @@ void DistanceSearch::decide(uint32_t node_a, uint32_t node_b) noexcept {
     for (uint32_t t = range.first; t < range.first + range.count && !overlapping; ++t) {
         const PlacedTriangle triangle = triangles_in_a ? place(a.tree, t) : place(b.tree, t, b_to_a);
         TriangleDistance found = distance(triangle, ellipsoid);
-        const bool meet = !(found.lower > 0) && !apart(triangle, ellipsoid);
+        const bool meet = !apart(triangle, ellipsoid);
         ++stats.triangle_tests;
         if (!triangles_in_a) std::swap(found.on_a, found.on_b);
         take(found, {node_a, node_b, triangles_in_a ? t : kNoTriangle, triangles_in_a ? kNoTriangle : t}, meet);

@@ -14,9 +14,6 @@ namespace {
 // Skins below this share of the first one are given up: nearly touching bodies gain nothing from them.
 constexpr float kLeastSkin = 0x1p-6f;
 
-// Distances of ellipsoids are found to this share of the lengths that enter, before they are compared with a margin.
-constexpr double kDistanceTolerance = 1e-9;
-
 } // namespace
 
 Body body(const TreeView& tree, uint32_t max_level) noexcept {
@@ -109,8 +106,7 @@ bool Descent::meets(const MeetingPair& pair) noexcept {
         if (in_a) return triangle_apart(place(a.tree, pair.triangle_a), place(b.tree.ellipsoid(pair.node_b), b_to_a));
         if (in_b) return triangle_apart(place(b.tree, pair.triangle_b, b_to_a), place(a.tree.ellipsoid(pair.node_a)));
         const auto x = place(a.tree.ellipsoid(pair.node_a)), y = place(b.tree.ellipsoid(pair.node_b), b_to_a);
-        if (distance == 0) return test_pair(x, y).verdict == PairVerdict::separated;
-        return distance_of(x, y, kDistanceTolerance * (distance + x.size + y.size)).lower > distance;
+        return apart(x, y, distance);
     });
 }
 

@@ -4,7 +4,8 @@
 // on top; leaves are decided in double precision (rounded_box.hpp). A closed exact tree whose triangles all are apart
 // from the shape holds it wholly or not at all: its center tells.
 //
-// Sound because a node covers the parts of all its children: if the shape is apart from the node, it is from these.
+// Sound because a node's bounding volume holds all leaves below it: if the shape is apart from the node, it is from
+// these.
 //
 // Complexity: one block test for each node that is opened.
 #undef HWY_TARGET_INCLUDE
@@ -94,7 +95,7 @@ private:
         if (count > q_.options.max_pair_tests - stats.pair_tests) return false;
         stats.pair_tests += count, ++stats.block_tests;
         q_.body.deepest = std::max(q_.body.deepest, first + count - 1);
-        const std::byte* const block = q_.body.tree.block(first / kBlockLanes);
+        const std::byte* const block = q_.body.block(first);
         uint32_t meet = boxes_meet_shape(block, q_.lanes) & ((1u << count) - 1);
         if (meet == 0) return true;
         const LaneTag d;

@@ -166,9 +166,9 @@ private:
         Body& body = kB ? q_.b : q_.a;
         const Body& other = kB ? q_.a : q_.b;
         const MotionFrame& frame = kB ? q_.frame_b : q_.frame_a;
-        const std::byte* const block = body.tree.block(first / kBlockLanes);
+        const std::byte* const block = body.block(first);
         const int32_t exponent = body.lattice.step_exponent;
-        const Single one = place_here(other.tree.block(node / kBlockLanes), node % kBlockLanes, frame.y_to_x);
+        const Single one = place_here(other.block(node), node % kBlockLanes, frame.y_to_x);
         LaneSpeeds speeds;
         bound_lanes(block, exponent, one, out.bounds);
         speed_lanes(block, exponent, one, frame, out.bounds, speeds);
@@ -196,7 +196,7 @@ private:
             const uint32_t first = children.first + i, count = std::min(children.count - i, kBlockLanes);
             Times times;
             test<kB>(first, node, 0, count, times);
-            const std::byte* const counts = body.tree.block(first / kBlockLanes) + kBlockCount;
+            const std::byte* const counts = body.block(first) + kBlockCount;
             for (uint32_t lane = 0; lane < count; ++lane) {
                 if (times.time[lane] >= q_.horizon) continue;
                 const auto stored = static_cast<uint8_t>(counts[lane]);

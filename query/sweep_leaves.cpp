@@ -79,7 +79,7 @@ Nearest nearest(const TrianglePiece& x, const TrianglePiece& y, const dvec3&, do
 }
 Nearest nearest(const TrianglePiece& x, const EllipsoidPiece& y, const dvec3&, double) {
     const TriangleDistance d = distance(x.placed, y.placed);
-    return nearest(d, !(d.lower > 0) && !apart(x.placed, y.placed));
+    return nearest(d, !apart(x.placed, y.placed));
 }
 Nearest nearest(const EllipsoidPiece& x, const TrianglePiece& y, const dvec3& n, double tolerance) {
     Nearest out = nearest(y, x, n, tolerance);
@@ -88,8 +88,7 @@ Nearest nearest(const EllipsoidPiece& x, const TrianglePiece& y, const dvec3& n,
 }
 Nearest nearest(const EllipsoidPiece& x, const EllipsoidPiece& y, const dvec3& n, double tolerance) {
     const Gap gap = distance_of(x.placed, y.placed, tolerance, n);
-    const bool meet = !(gap.lower > 0) && test_pair(x.placed, y.placed).verdict != PairVerdict::separated;
-    return {std::max(gap.upper, 0.0), meet, gap.point_a, gap.point_b, gap.normal};
+    return {std::max(gap.upper, 0.0), !apart(x.placed, y.placed), gap.point_a, gap.point_b, gap.normal};
 }
 
 void store(const dvec3& v, float (&out)[3]) {
@@ -204,8 +203,8 @@ double SweepSearch::advance(uint32_t node_a, uint32_t node_b, bool as_covers) no
     const TriangleRange in_a = as_covers ? TriangleRange{} : a.tree.triangles(node_a),
                         in_b = as_covers ? TriangleRange{} : b.tree.triangles(node_b);
     const dvec3 center_a = motion.a().center(), center_b = now.center_b;
-    const auto ellipsoid_a = [&] { return EllipsoidPiece(place(a.tree.ellipsoid(node_a)), center_a); };
-    const auto ellipsoid_b = [&] { return EllipsoidPiece(place(b.tree.ellipsoid(node_b), now.b_to_a), center_b); };
+    const auto ellipsoid_a = [&] { return EllipsoidPiece(place(a.tree.bound(node_a)), center_a); };
+    const auto ellipsoid_b = [&] { return EllipsoidPiece(place(b.tree.bound(node_b), now.b_to_a), center_b); };
     double least = horizon - time;
     dvec3 n(0);
     if (in_a.count == 0 && in_b.count == 0) {

@@ -58,7 +58,8 @@ struct SweepSearch {
     void move_to(double t) noexcept;
 
     /// Time, not before the present one, until which two leaves keep apart, at most `horizon`. If they meet now, takes
-    /// the meeting and returns the present time. `as_covers`: the nodes' ellipsoids stand for what is in them.
+    /// the meeting and returns the present time. `as_covers`: what covers the nodes stands for what is
+    /// below them.
     double advance(uint32_t node_a, uint32_t node_b, bool as_covers) noexcept;
 
 private:
