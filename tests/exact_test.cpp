@@ -774,11 +774,11 @@ TEST(ExactQuery, ABudgetIsExactAndDeeperNeverRevokesSeparated) {
             for (int i = 0; i < 4; ++i) {
                 const Query q = at(between(random), random.in(0.5, 1));
                 const CollideResult full = ask(a.built, b.built, q);
-                const uint64_t need = full.stats.pair_tests;
+                const uint64_t need = full.stats.tests();
                 for (uint64_t budget = 0; budget <= need + 1; budget += 1 + budget / 4) {
                     const CollideResult result = ask(a.built, b.built, q, {.max_pair_tests = budget});
                     ASSERT_EQ(result.verdict, budget < need ? Verdict::undecided : full.verdict);
-                    ASSERT_LE(result.stats.pair_tests, std::min(budget, need));
+                    ASSERT_LE(result.stats.tests(), std::min(budget, need));
                 }
                 Verdict before = Verdict::overlapping;
                 for (uint32_t level = 0; level < 6; ++level) {
