@@ -2,6 +2,7 @@
 // told apart by spheres around their roots, and a PairCache answers for bodies that have moved little.
 #include "query/descent.hpp"
 #include "query/enclosure.hpp"
+#include "query/limits.hpp"
 #include "query/order.hpp"
 
 #include <glm/geometric.hpp>
@@ -87,7 +88,8 @@ CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeVi
 }
 
 CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                      QueryContext& context, const QueryOptions& options, PairCache* cache) noexcept {
+                      QueryContext& context, const QueryOptions& query_options, PairCache* cache) noexcept {
+    const QueryOptions options = query::sound(query_options);
     if (!usable(cache, a, b, options)) cache = nullptr;
     double moved = 0, smaller = 0;
     if (cache) {

@@ -31,7 +31,7 @@ struct Descent {
     Body a, b;
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
-    const QueryOptions& options;
+    const QueryOptions options; // sound
     QueryContext::Entry* const stack;
     QueryStats stats;
 

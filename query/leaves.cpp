@@ -2,6 +2,7 @@
 #include "query/corners.hpp"
 #include "query/descent.hpp"
 #include "query/gap.hpp"
+#include "query/limits.hpp"
 #include "query/triangle.hpp"
 #include "query/triangle_ellipsoid.hpp"
 #include "query/triangle_lanes.hpp"
@@ -26,7 +27,7 @@ Descent::Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativeP
                  const QueryOptions& query_options) noexcept
     : a(body(tree_a, query_options.max_level)), b(body(tree_b, query_options.max_level)), b_to_a(pose_b_to_a),
       lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
-      lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(query_options),
+      lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(query_options)),
       stack(context.entries) {}
 
 void Descent::set_skin(float distance) noexcept {

@@ -17,6 +17,7 @@
 
 #include "query/convert.hpp"
 #include "query/descent.hpp"
+#include "query/limits.hpp"
 #include "query/ray.hpp"
 #include "query/ray_lanes-inl.hpp"
 
@@ -199,8 +200,9 @@ namespace {
 using query::to_double, query::to_float;
 
 RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
-                   const QueryOptions& options, bool any, const float* growth = nullptr) {
+                   const QueryOptions& query_options, bool any, const float* growth = nullptr) {
     using glm::dvec3;
+    const QueryOptions options = query::sound(query_options);
     RaycastResult out;
     const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
     query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.bound(0));

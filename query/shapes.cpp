@@ -16,6 +16,7 @@
 
 #include "query/descent.hpp"
 #include "query/inside.hpp"
+#include "query/limits.hpp"
 #include "query/rounded_box.hpp"
 #include "query/shape_lanes-inl.hpp"
 
@@ -193,19 +194,23 @@ OverlapResult overlap_with(const TreeView& tree, const PlacedHalfSpace& shape, Q
 namespace prolate {
 
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(sphere, pose, options.margin), context, options);
 }
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(capsule, pose, options.margin), context, options);
 }
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Box& box, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(box, pose, options.margin), context, options);
 }
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(half_space, pose, options.margin), context, options);
 }
 

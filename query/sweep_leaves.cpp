@@ -10,6 +10,7 @@
 //
 // n is the direction from one closest point to the other; an inexact one costs steps only.
 #include "query/gap.hpp"
+#include "query/limits.hpp"
 #include "query/sweep_search.hpp"
 #include "query/triangle_ellipsoid.hpp"
 
@@ -102,6 +103,11 @@ float length_up(const dvec3& v) {
     return static_cast<float>(glm::length(v) * (1 + 0x1p-20));
 }
 
+SweepOptions sound(SweepOptions options) {
+    options.margin = sound_length(options.margin), options.tolerance = sound_tolerance(options.tolerance);
+    return options;
+}
+
 // All in X's frame, metres.
 MotionFrame frame(const LatticePose& y_to_x, const LatticeInfo& lattice, const dvec3& velocity, const dvec3& spin_x,
                   const dvec3& spin_y, const dvec3& center_x, const dvec3& center_y) {
@@ -120,7 +126,7 @@ MotionFrame frame(const LatticePose& y_to_x, const LatticeInfo& lattice, const d
 SweepSearch::SweepSearch(const TreeView& tree_a, const Motion& motion_a, const TreeView& tree_b, const Motion& motion_b,
                          QueryContext& context, const SweepOptions& sweep_options) noexcept
     : a(body(tree_a, sweep_options.max_level)), b(body(tree_b, sweep_options.max_level)), motion(motion_a, motion_b),
-      options(sweep_options), entries(context.entries) {
+      options(sound(sweep_options)), entries(context.entries) {
     move_to(0);
     const PlacedEllipsoid x = place(a.tree.root()), y = place(b.tree.root(), now.b_to_a);
     const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);
@@ -197,6 +203,12 @@ bool SweepSearch::advance_pair(const X& x, const Y& y, const MeetingPair& pair, 
     found = true, horizon = time, witness = pair, distance = d.meet ? 0 : d.upper;
     on_a = d.on_a, on_b = d.on_b, normal = d.n;
     return false;
+}
+
+uint64_t SweepSearch::triangle_tests(uint32_t node_a, uint32_t node_b, bool as_covers) const noexcept {
+    const uint32_t in_a = as_covers ? 0 : a.tree.triangles(node_a).count;
+    const uint32_t in_b = as_covers ? 0 : b.tree.triangles(node_b).count;
+    return in_a + in_b == 0 ? 0 : uint64_t{std::max(in_a, 1u)} * std::max(in_b, 1u);
 }
 
 double SweepSearch::advance(uint32_t node_a, uint32_t node_b, bool as_covers) noexcept {
