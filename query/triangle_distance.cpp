@@ -40,7 +40,8 @@ public:
         return {.lower = lower(bound),
                 .upper = std::isfinite(square_) ? std::sqrt(square_) + bound : std::numeric_limits<double>::infinity(),
                 .on_a = pair_.origin + x_,
-                .on_b = pair_.origin + y_};
+                .on_b = pair_.origin + y_,
+                .normal = normal_};
     }
 
 private:
@@ -51,7 +52,10 @@ private:
     // Is the lower bound as good as the upper one, once n is considered?
     bool bound_by(const dvec3& n) {
         const double gap = pair_.gap(n), length = glm::length(n);
-        if (gap * length_ > gap_ * length) gap_ = gap, length_ = length;
+        if (gap * length_ > gap_ * length) {
+            gap_ = gap, length_ = length;
+            normal_ = pair_.leads_from_a(n) ? n : -n;
+        }
         return gap_ > kTight * std::sqrt(square_) * length_;
     }
     // The same for points x of A and y of B.
@@ -95,7 +99,8 @@ private:
     const TrianglePair& pair_;
     double square_ = std::numeric_limits<double>::infinity(); // |y - x|^2 of the nearest points so far
     dvec3 x_, y_;
-    double gap_ = 0, length_ = 1; // gap(n) and |n| of the best direction so far
+    double gap_ = 0, length_ = 1; // gap(n) and |n| of the best direction so far, which is
+    dvec3 normal_{0, 0, 0};       // or its opposite
 };
 
 } // namespace

@@ -24,6 +24,9 @@ struct TriangleDistance {
     double lower;          // the triangles are not nearer; 0 if they meet
     double upper;          // nor farther; infinite if a pose was not finite
     glm::dvec3 on_a, on_b; // points of the triangles, in A's frame, `upper` apart but for rounding
+    // From A to B, of any length: along it the gap is `lower`. The way from on_a to on_b loses its digits sooner: where
+    // edges are nearly parallel, points along them are equally near, and one pair of them says nothing of the direction.
+    glm::dvec3 normal{0, 0, 0};
 };
 /// With the same margin, `lower` is positive only if apart() of triangle.hpp holds, and always if it does. The margin is
 /// a parameter only so that the tests can show that wrong ones are caught.

@@ -35,7 +35,8 @@ public:
         return {.lower = least > 0 ? least : 0, // a NaN, too
                 .upper = std::isfinite(distance_) ? distance_ + bound : std::numeric_limits<double>::infinity(),
                 .on_a = ellipsoid_.center + x_,
-                .on_b = ellipsoid_.center + y_};
+                .on_b = ellipsoid_.center + y_,
+                .normal = -normal_};
     }
 
 private:
@@ -45,7 +46,7 @@ private:
         if (distance < distance_) distance_ = distance, x_ = x, y_ = y;
         const double least = std::min({glm::dot(n, p_[0]), glm::dot(n, p_[1]), glm::dot(n, p_[2])});
         const double gap = (least - glm::length(n * ellipsoid_.factor)) / glm::length(n);
-        if (gap > gap_) gap_ = gap;
+        if (gap > gap_) gap_ = gap, normal_ = n;
         return gap_ > kTight * distance_;
     }
     // The support point in direction n.
@@ -126,7 +127,7 @@ private:
     const dmat3 q_, to_ball_;
     double distance_ = std::numeric_limits<double>::infinity();
     double gap_ = -std::numeric_limits<double>::infinity();
-    dvec3 x_{0, 0, 0}, y_{0, 0, 0};
+    dvec3 x_{0, 0, 0}, y_{0, 0, 0}, normal_{0, 0, 0}; // the last: of the best gap, from the ellipsoid
 };
 
 } // namespace

@@ -52,6 +52,12 @@ struct TrianglePair {
         return std::max(y.low - x.high, x.low - y.high);
     }
 
+    /// Does n, and not -n, lead from a to b where gap(n) is positive?
+    bool leads_from_a(const glm::dvec3& n) const {
+        const Range x = range_a(n), y = range_b(n);
+        return y.low - x.high >= x.low - y.high;
+    }
+
     /// Calls visit(n) for each candidate direction (triangle.hpp) until one returns true; did one?
     template <class Visit> bool any_direction(Visit&& visit) const {
         if (visit(normal_a) || visit(normal_b)) return true;

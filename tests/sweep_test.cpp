@@ -12,9 +12,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -606,6 +608,43 @@ TEST(Motion, BetweenTwoPosesIsTheSmallerTurn) {
                      q = reference::rotation(end.rotation) * vector(x) + vector(end.translation);
         ASSERT_LT(length(p - q), 2e-6);
     }
+}
+
+// However small the tolerance, and however ill the closest points of nearly parallel edges are defined: what is reported
+// to meet is as near as the least tolerance.
+TEST(Sweep, SliversComeAsNearAsTheLeastTolerance) {
+    Random random(3);
+    const auto context = std::make_unique<QueryContext>();
+    int found = 0;
+    for (int i = 0; i < 20'000; ++i) {
+        const auto sliver = [&] {
+            Mesh mesh;
+            const double thin = random.log_in(1e-9, 1);
+            const Point u = random.direction(), v = random.direction();
+            for (int k = 0; k < 3; ++k) {
+                const double along = k == 2 ? random.in(-1, 1) : 2 * k - 1;
+                const double across = k == 2 ? thin : thin * random.in(-0.1, 0.1);
+                Point p{};
+                for (size_t c = 0; c < 3; ++c) p[c] = along * u[c] + across * v[c];
+                mesh.vertices.push_back(scenes::to_float(p));
+            }
+            mesh.triangles = {{0, 1, 2}};
+            return scenes::exact_tree(mesh, {.closed = false}).bytes;
+        };
+        const auto bytes_a = sliver(), other = sliver();
+        const auto& bytes_b = i % 2 ? bytes_a : other; // itself, turned by little
+        const TreeView a = *TreeView::open(bytes_a), b = *TreeView::open(bytes_b);
+        const Point d = random.direction();
+        const auto far = [&d](double t) { return scenes::to_float({t * d[0], t * d[1], t * d[2]}); };
+        Pose start{far(2.5), random.rotation()};
+        if (i % 2) start.rotation = {0, static_cast<float>(random.log_in(1e-9, 1e-3)), 0, 1};
+        const SweepResult r = sweep(a, {}, b, {start, far(-2.5), {}, {}}, *context, {.tolerance = 1e-12});
+        if (r.verdict != Verdict::overlapping) continue;
+        ++found;
+        const auto x = query::place(a.root()), y = query::place(b.root(), query::relative_pose({}, start));
+        ASSERT_LE(r.distance, std::max(0x1p-24 * (x.size + y.size), 0x1p-27 * (x.reach + y.reach)));
+    }
+    EXPECT_GT(found, 15'000);
 }
 
 } // namespace

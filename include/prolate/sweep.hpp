@@ -35,8 +35,9 @@ Motion motion_between(const Pose& start, const Pose& end, const Vec3& center = {
 /// Limits of a sweep() query.
 struct SweepOptions {
     /// Bodies that come nearer than margin + tolerance count as meeting, metres; those that pass farther away do not.
-    /// More is faster. 0 stands for 1e-4 of the smaller body's size. What is less than 2^-24 of both sizes, or than
-    /// 2^-38 of all lengths that enter (times the angles turned by), counts as that much. Size: |L| of the root.
+    /// More is faster. 0, negative or NaN stand for 1e-4 of the smaller body's size. What is less than 2^-24 of both
+    /// sizes, or than 2^-27 of all lengths that enter (2^-38 times 1 + the angles turned by, if that is more), counts as
+    /// that much. Size: |L| of the root. Lengths: it, and what lies between the root and the origins.
     double tolerance = 0;
     /// Look no deeper than this level of either tree (0 = roots only): the bodies are then its coarser covers, which
     /// meet no later.
