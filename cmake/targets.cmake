@@ -9,6 +9,10 @@ function(prolate_target target)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
   target_compile_options(${target} PRIVATE
     -ffp-contract=off $<$<CXX_COMPILER_ID:GNU>:-fno-tree-slp-vectorize> -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+  # 32-bit x86: by SSE2, since the x87 rounds to other widths than types say. src/host.hpp refuses to compile for that.
+  if(CMAKE_SIZEOF_VOID_P EQUAL 4 AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(i.86|x86|amd64)")
+    target_compile_options(${target} PRIVATE -msse2 -mfpmath=sse)
+  endif()
   if(PROLATE_WERROR)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

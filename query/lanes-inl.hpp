@@ -64,6 +64,9 @@ struct LaneNodes {
     Lanes l11, l21, l22, l31, l32, l33;
 };
 
+static_assert(HWY_TARGET == HWY_SCALAR || std::endian::native == std::endian::little,
+              "vectors take the file's little-endian numbers as they stand: disable this target in query/targets.hpp");
+
 // 16-bit integers at any address, as floats.
 template <class T> HWY_INLINE Lanes load_integers(const std::byte* from) {
     const hn::Rebind<T, LaneTag> d16;
@@ -90,7 +93,7 @@ HWY_INLINE LaneNodes load_nodes(const std::byte* block, size_t first, int32_t st
                 hn::Set(d32, kHighestExponent));
     const Lanes one = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(exponent, hn::Set(d32, 127))));
     const Lanes two = hn::Add(one, one); // off-diagonal integers count twice as much
-    LaneNodes out;
+    LaneNodes out{};
     out.x = load_integers<uint16_t>(at(kBlockCenter, 0));
     out.y = load_integers<uint16_t>(at(kBlockCenter, 1));
     out.z = load_integers<uint16_t>(at(kBlockCenter, 2));
@@ -279,7 +282,7 @@ struct LaneShapes {
     Lanes size;
 };
 HWY_INLINE LaneShapes shapes_of(const LaneNodes& e) {
-    LaneShapes q;
+    LaneShapes q{};
     q.xx = hn::Mul(e.l11, e.l11), q.xy = hn::Mul(e.l21, e.l11), q.xz = hn::Mul(e.l31, e.l11);
     q.yy = hn::Add(hn::Mul(e.l21, e.l21), hn::Mul(e.l22, e.l22));
     q.yz = hn::Add(hn::Mul(e.l31, e.l21), hn::Mul(e.l32, e.l22));
@@ -357,7 +360,7 @@ HWY_INLINE LaneTerms evaluate(const LaneNodes& e, const Single& s) {
     const LaneShapes q = shapes_of(e);
     const Lanes w2 = hn::Div(set(1), hn::Mul(q.size, hn::Add(q.size, set(s.size)))); // the trace of Q1 / |L1| is |L1|
     const LaneVector r = between(e, s), n = adjugate_times(mixed(q, hn::Mul(q.size, w2), w2, s), r);
-    LaneTerms t;
+    LaneTerms t{};
     t.x = n.x, t.y = n.y, t.z = n.z;
     t.size = q.size;
     t.in_a = transposed_times(s, n), t.in_b = transposed_times(e, n);

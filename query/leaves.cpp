@@ -48,7 +48,7 @@ template <class Apart> bool Descent::parted(Apart&& apart) noexcept {
 
 bool Descent::take(const MeetingPair& pair) noexcept {
     if (each != nullptr) each(each_user, pair);
-    if (found < pairs.size()) pairs[found] = pair;
+    if (found < pairs.size()) pairs[static_cast<size_t>(found)] = pair;
     ++found;
     return !all;
 }

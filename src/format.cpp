@@ -11,7 +11,10 @@
 #include <cassert>
 #include <cstring>
 #include <iterator>
+#include <new>
 #include <numeric>
+#include <span>
+#include <utility>
 
 namespace prolate::format {
 namespace {
@@ -63,8 +66,10 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     const uint64_t blocks_end = end_of_blocks(level_count, first_block.back());
     const auto vertex_count = static_cast<uint32_t>(triangles.vertices.size());
     const auto triangle_count = static_cast<uint32_t>(triangles.triangles.size());
-    std::vector<std::byte> bytes(blocks_end +
-                                 (info.exact ? section_bytes(first_block.back(), vertex_count, triangle_count) : 0));
+    const uint64_t total =
+        blocks_end + (info.exact ? section_bytes(first_block.back(), vertex_count, triangle_count) : 0);
+    if (!std::in_range<size_t>(total)) throw std::bad_alloc();
+    std::vector<std::byte> bytes(static_cast<size_t>(total));
     std::byte* const h = bytes.data();
 
     std::memcpy(h + kAtMagic, kMagic, sizeof kMagic);
@@ -72,7 +77,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     store_le(h + kAtHeaderSize, static_cast<uint16_t>(kHeaderBytes));
     store_le(h + kAtFlags, (info.surface_mode ? kSurfaceMode : 0u) | (info.exact ? kExact : 0u) |
                                (info.proved ? kProved : 0u) | (info.goal_reached ? 0u : kGoalMissed));
-    store_le(h + kAtTotalSize, uint64_t{bytes.size()});
+    store_le(h + kAtTotalSize, total);
     store_le(h + kAtSourceHash, info.source_hash);
     store_le(h + kAtOptionsHash, info.options_hash);
     store_le(h + kAtNodeCount, static_cast<uint32_t>(node_count));
@@ -98,7 +103,8 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         store_le(h + kAtVertexCount, vertex_count);
         store_le(h + kAtTriangleCount, triangle_count);
         store_le(h + kAtComponentCount, triangles.components);
-        store_section({h + blocks_end, bytes.size() - blocks_end}, first_block.back() * kHullBytes, triangles);
+        store_section(std::span(bytes).subspan(static_cast<size_t>(blocks_end)),
+                      static_cast<size_t>(first_block.back()) * kHullBytes, triangles);
     }
 
     uint32_t next_triangle = 0;

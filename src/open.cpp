@@ -275,8 +275,9 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         const LevelInfo level = view.level(l);
         view.node_count_ += level.node_count;
         view.block_count_ += level.block_count;
-        const size_t begin = level.end_byte - level.block_count * kBlockBytes;
-        if (options.check_hash && hash_bytes(bytes.subspan(begin, level.end_byte - begin)) !=
+        const size_t level_bytes = level.block_count * kBlockBytes;
+        const size_t begin = static_cast<size_t>(level.end_byte) - level_bytes;
+        if (options.check_hash && hash_bytes(bytes.subspan(begin, level_bytes)) !=
                                       load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
             return bad("the nodes of a level are damaged (hash mismatch)", begin);
         check.begin_level(view.block_count_);
@@ -301,7 +302,8 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         return bad("the leaves do not share out the triangles", kAtTriangleCount);
     if (!exact || view.is_prefix_) return view;
 
-    const size_t hulls = present_end, hull_bytes = view.block_count_ * kHullBytes, hash = hulls + hull_bytes;
+    const auto hulls = static_cast<size_t>(present_end);
+    const size_t hull_bytes = view.block_count_ * kHullBytes, hash = hulls + hull_bytes;
     const size_t vertices = hash + kSectionHashBytes;
     if (options.check_hash && section_hash(bytes.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
         return bad("the triangles are damaged (hash mismatch)", hash);
