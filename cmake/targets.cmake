@@ -18,9 +18,10 @@ function(prolate_target target)
   endif()
   if(PROLATE_SANITIZE)
     # PUBLIC link: whoever links an instrumented library needs the runtime.
-    target_compile_options(${target} PRIVATE -fsanitize=address,undefined -fno-sanitize-recover=all
+    string(REPLACE address address,undefined sanitizers ${PROLATE_SANITIZE})
+    target_compile_options(${target} PRIVATE -fsanitize=${sanitizers} -fno-sanitize-recover=all
       -fno-omit-frame-pointer)
-    target_link_options(${target} PUBLIC -fsanitize=address,undefined)
+    target_link_options(${target} PUBLIC -fsanitize=${sanitizers})
   endif()
   if(PROLATE_BUILD_FUZZ)
     target_compile_options(${target} PRIVATE -fsanitize=fuzzer-no-link) # coverage, which guides the fuzzer

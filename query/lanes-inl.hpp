@@ -148,8 +148,8 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
 
     Single s;
     const hn::CappedTag<double, 4> d64;
-    const auto x = hn::Set(d64, double{stored_x}), y = hn::Set(d64, double{stored_y}),
-               z = hn::Set(d64, double{stored_z});
+    const auto wide = [d64](int32_t stored) { return hn::Set(d64, static_cast<double>(stored)); };
+    const auto x = wide(stored_x), y = wide(stored_y), z = wide(stored_z);
     for (size_t i = 0; i < 4; i += hn::Lanes(d64)) {
         const auto column = [&](size_t c) { return hn::Load(d64, pose.linear[c] + i); };
         const auto exact = hn::Add(hn::Add(hn::Mul(column(0), x), hn::Mul(column(1), y)),
