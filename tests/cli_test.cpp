@@ -998,7 +998,7 @@ TEST_F(Cli, ExportsJsonAndPictures) {
 
     // Every format through the command, into a file and into a pipe, with what a level has.
     const size_t cut = info["levels"][1]["cut"];
-    for (const auto& [format, mark] : {std::pair{"obj", "\no node_"}, {"glb", "\"mesh\":"}, {"pov", "  sphere {"}}) {
+    for (const auto& [format, mark] : {std::pair{"obj", "\n# node_"}, {"glb", "\"mesh\":"}, {"pov", "  sphere {"}}) {
         SCOPED_TRACE(format);
         const std::string path = file(std::string("a.") + format);
         ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", path, "--level", "1"}).code, 0);
