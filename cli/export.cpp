@@ -122,8 +122,8 @@ void add_export(CLI::App& app, Work& chosen) {
     command->add_option("--segments", a->segments, "ply, obj, glb: of a section through an ellipsoid, in steps of 4")
         ->check(CLI::Range(4u, kMaxSegments))
         ->capture_default_str();
-    command->add_flag(
-        "--outer,!--no-outer", a->outer,
+    command->add_flag_function(
+        "--outer,!--no-outer", [a](int64_t count) { a->outer = count > 0; },
         "ply, obj, glb: triangles outside the ellipsoids, so that the meshes cover (default: not for glb)");
     command
         ->add_option("--view", a->view, "pov: where the viewer stands: azimuth and elevation, degrees (default: 30,18)")

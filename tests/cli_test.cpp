@@ -1010,6 +1010,16 @@ TEST_F(Cli, ExportsJsonAndPictures) {
         EXPECT_EQ(piped.out, content);
         EXPECT_EQ(piped.err, "");
     }
+    // What is meant for collision lies outside the ellipsoids, what is looked at does not, unless otherwise told.
+    for (const char* format : {"ply", "obj", "glb"}) {
+        const auto exported = [&](const char* flag) {
+            const Outcome outcome = run({"export", shared("peanut.etree"), "-o", "-", "--format", format, flag});
+            EXPECT_EQ(outcome.code, 0) << outcome.err;
+            return outcome.out;
+        };
+        EXPECT_NE(exported("--outer"), exported("--no-outer"));
+        EXPECT_EQ(exported("--segments=32"), exported(format == std::string("glb") ? "--no-outer" : "--outer"));
+    }
     ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("fine.ply"), "--level", "1", "--segments", "64"}).code,
               0);
     const auto fine = load_mesh(file("fine.ply").c_str());
