@@ -22,10 +22,18 @@ are the ellipsoids, and json adds the triangles of each leaf, as places in the f
 
   csv   level,cx,cy,cz,r1,r2,r3,R11,...,R33: center, radii, and the rotation row by row; its column i is the direction
         of radius i
-  json  the same and the tree's links, in full precision
-  ply, obj  ellipsoids as meshes, their corners on the ellipsoids; a color for each corner; obj names each by its node
+  json  the same, the factor L of {center + L u : |u| <= 1}, row by row, and the tree's links
+  ply, obj  ellipsoids as meshes
   glb   glTF 2.0, for Blender and viewers: one sphere, and a node for each ellipsoid that moves, turns and stretches it
   pov   a POV-Ray scene with true ellipsoids, a camera, an area light and a ground plane
+
+What covers: centers and factors (json, pov) are exact, also as read in single precision. Radii (csv, json) are rounded
+up, and cover as read in double precision; in single precision, multiply them by 1 + 3e-7 r1 / r3. Meshes for collision
+- ply and obj, unless --no-outer is given - have their triangles outside the ellipsoids, as read in single precision,
+and cover. Pictures - glb, unless --outer is given - have their corners on the ellipsoids, and do not.
+
+obj for collision has no parts and no colors, because simulators drop triangles of parts; many of them take the convex
+hull of a whole file. With --no-outer, obj names each ellipsoid by its node. ply has a color for each corner.
 
 Colors are those of "prolate render": a hue for each child of the root, which all below it keep.
 
@@ -40,6 +48,7 @@ struct ExportArguments {
     std::string tree, output, format;
     std::optional<uint32_t> level;
     uint32_t segments = 32;
+    std::optional<bool> outer;
     std::vector<double> view = {View{}.azimuth, View{}.elevation};
     std::string up = "y";
 };
@@ -73,9 +82,10 @@ Selection cut_at(const TreeView& tree, uint32_t level) {
 
 std::string picture(const TreeView& tree, std::string_view format, const ExportArguments& a) {
     const std::vector<Piece> pieces = pieces_of(tree, a.level.value_or(tree.level_count() - 1));
-    if (format == "ply") return as_ply(pieces, a.segments);
-    if (format == "obj") return as_obj(pieces, a.segments);
-    if (format == "glb") return as_glb(pieces, a.segments);
+    const Facets facets = a.outer.value_or(format != "glb") ? Facets::outer : Facets::inscribed;
+    if (format == "ply") return as_ply(pieces, a.segments, facets);
+    if (format == "obj") return as_obj(pieces, a.segments, facets);
+    if (format == "glb") return as_glb(pieces, a.segments, facets);
     const auto axis = std::find(std::begin(kUpAxes), std::end(kUpAxes), a.up) - std::begin(kUpAxes);
     return as_pov(pieces, {a.view[0], a.view[1], static_cast<UpAxis>(axis)});
 }
@@ -112,6 +122,9 @@ void add_export(CLI::App& app, Work& chosen) {
     command->add_option("--segments", a->segments, "ply, obj, glb: of a section through an ellipsoid, in steps of 4")
         ->check(CLI::Range(4u, kMaxSegments))
         ->capture_default_str();
+    command->add_flag_function(
+        "--outer,!--no-outer", [a](int64_t count) { a->outer = count > 0; },
+        "ply, obj, glb: triangles outside the ellipsoids, so that the meshes cover (default: not for glb)");
     command
         ->add_option("--view", a->view, "pov: where the viewer stands: azimuth and elevation, degrees (default: 30,18)")
         ->delimiter(',')

@@ -998,7 +998,7 @@ TEST_F(Cli, ExportsJsonAndPictures) {
 
     // Every format through the command, into a file and into a pipe, with what a level has.
     const size_t cut = info["levels"][1]["cut"];
-    for (const auto& [format, mark] : {std::pair{"obj", "\no node_"}, {"glb", "\"mesh\":"}, {"pov", "  sphere {"}}) {
+    for (const auto& [format, mark] : {std::pair{"obj", "\n# node_"}, {"glb", "\"mesh\":"}, {"pov", "  sphere {"}}) {
         SCOPED_TRACE(format);
         const std::string path = file(std::string("a.") + format);
         ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", path, "--level", "1"}).code, 0);
@@ -1009,6 +1009,16 @@ TEST_F(Cli, ExportsJsonAndPictures) {
         const Outcome piped = run({"export", shared("peanut.etree"), "-o", "-", "--format", format, "--level", "1"});
         EXPECT_EQ(piped.out, content);
         EXPECT_EQ(piped.err, "");
+    }
+    // What is meant for collision lies outside the ellipsoids, what is looked at does not, unless otherwise told.
+    for (const char* format : {"ply", "obj", "glb"}) {
+        const auto exported = [&](const char* flag) {
+            const Outcome outcome = run({"export", shared("peanut.etree"), "-o", "-", "--format", format, flag});
+            EXPECT_EQ(outcome.code, 0) << outcome.err;
+            return outcome.out;
+        };
+        EXPECT_NE(exported("--outer"), exported("--no-outer"));
+        EXPECT_EQ(exported("--segments=32"), exported(format == std::string("glb") ? "--no-outer" : "--outer"));
     }
     ASSERT_EQ(run({"export", shared("peanut.etree"), "-o", file("fine.ply"), "--level", "1", "--segments", "64"}).code,
               0);

@@ -9,6 +9,7 @@
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
 
+#include <prolate/bounds.hpp>
 #include <prolate/build.hpp>
 #include <prolate/collide.hpp>
 #include <prolate/distance.hpp>
@@ -788,6 +789,51 @@ TEST(ExactQuery, ABudgetIsExactAndDeeperNeverRevokesSeparated) {
                 }
                 ASSERT_EQ(before, full.verdict);
             }
+}
+
+// ---- boxes ----
+
+// How much longer than the least one a side of the body's box is, at most; below 0 if it does not hold the body.
+double longer_than_need_be(const TreeView& tree, const Pose& pose) {
+    const auto rows = scenes::rotation_rows(pose.rotation);
+    const Bounds box = bounds(tree, pose);
+    const double lower[] = {box.lower.x, box.lower.y, box.lower.z}, upper[] = {box.upper.x, box.upper.y, box.upper.z};
+    double longest = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        double least = HUGE_VAL, most = -HUGE_VAL;
+        for (uint32_t v = 0; v < tree.vertex_count(); ++v) { // each belongs to a triangle
+            const Vec3 p = tree.vertex(v);
+            const double at = rows[k][0] * p.x + rows[k][1] * p.y + rows[k][2] * p.z;
+            least = std::min(least, at), most = std::max(most, at);
+        }
+        if (lower[k] > least || upper[k] < most) return -1;
+        longest = std::max(longest, (upper[k] - lower[k]) / (most - least) - 1);
+    }
+    return longest;
+}
+
+TEST(ExactBoxes, AreWithinAPercentOfTheLeastOnes) {
+    const std::pair<const char*, Mesh> meshes[] = {
+        {"cube", shapes::box()},
+        {"plate", shapes::box(10, 10, 0.001f)},
+        {"ball", shapes::icosphere(4)},
+        {"torus", shapes::torus(1, 0.3f, 60, 30)},
+        {"far", shapes::moved(shapes::torus(1, 0.3f, 40, 20), {300, -200, 100})},
+        {"pieces", shapes::two_pieces()},
+        {"spiral", spiral()}};
+    scenes::Random random(1);
+    for (const auto& [name, mesh] : meshes) {
+        SCOPED_TRACE(name);
+        const Build built = must_build(mesh);
+        for (int i = 0; i < 200; ++i) {
+            const double by =
+                longer_than_need_be(built.tree.view(), {{}, i == 0 ? Quat{0, 0, 0, 1} : random.rotation()});
+            EXPECT_GE(by, 0);
+            EXPECT_LT(by, 0.01);
+        }
+    }
+    const Build sheet = must_build(shapes::sheet(1, 1, 40));
+    for (int i = 0; i < 200; ++i) EXPECT_LT(longer_than_need_be(sheet.tree.view(), {{}, random.rotation()}), 0.01);
 }
 
 } // namespace
