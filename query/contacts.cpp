@@ -1,17 +1,18 @@
 // Contact manifolds: all pairs of leaves that meet, as collide_all() finds them, each turned into points with a normal
 // (triangle_contact.hpp, gap.hpp), and all of these into a few manifolds (manifold.hpp).
 //
-// What a pair of triangles says for itself may be wrong: their edges may be internal ones of a flat surface, and a
-// small triangle that stands out of a face by little is parted soonest sideways. So the pairs are gone through twice.
-// The first time for the normals: those of faces make patches, others wait and count if no patch resolves them, that
-// is, unless they are parted once the bodies are moved along its normal as far as that patch needs anyway. Patches all
+// The pairs are gone through twice. The first time for the normals: of each pair that along which its surroundings
+// overlap least (triangle_contact.hpp), if that is less than what a patch found before needs to resolve it, that is, to
+// have it parted once the bodies are moved along the patch's normal. Normals of faces make patches, others wait and
+// count if no patch resolves them that is no deeper. Then the deepest vertices of each patch are found, and patches all
 // of which another one resolves are dropped. The second time for the points: of each pair along the normal of the first
 // patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
 //
 // Bodies are taken in an order that depends on their trees alone, if these differ: poses change from step to step, and
 // what follows from the order should not.
 //
-// Complexity: twice collide_all()'s, and some microseconds for each pair that meets.
+// Complexity: twice collide_all()'s, and some microseconds for each pair that meets; for each patch up to 18 climbs and
+// rays.
 #include "query/climb.hpp"
 #include "query/convert.hpp"
 #include "query/descent.hpp"
@@ -103,24 +104,31 @@ public:
     // Between the two passes: settles the normals and depths.
     void settle() {
         flush();
-        const Patch* found[kManifolds];
-        const uint32_t count = patches_.sorted(found);
-        Way ways[kManifolds];
-        Patch deepest[kManifolds];
-        bool needed[kManifolds] = {};
-        for (uint32_t i = 0; i < count; ++i) {
-            ways[i] = {found[i]->normal(), found[i]->depth()}, deepest[i] = Patch(ways[i].normal), needed[i] = true;
-            add_deepest(*found[i], deepest[i]);
-            ways[i].depth = std::max(ways[i].depth, deepest[i].depth());
-        }
+        struct Group {
+            const Patch* patch;
+            Way way;
+            Patch deepest;
+        };
+        Group groups[Patches::kMost];
+        uint32_t count = 0;
+        patches_.for_each([&](const Patch& p) {
+            Group group{&p, {p.normal(), p.depth()}, Patch(p.normal())};
+            add_deepest(p, group.deepest);
+            group.way.depth = std::max(group.way.depth, group.deepest.depth());
+            uint32_t at = count++; // the deepest first
+            for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];
+            groups[at] = group;
+        });
+        bool needed[Patches::kMost];
+        std::fill_n(needed, count, true);
         for (uint32_t i = 0; i < count; ++i)
             for (uint32_t j = 0; j < count && needed[i]; ++j)
                 if (j != i && needed[j])
-                    needed[i] = !std::all_of(found[i]->begin(), found[i]->end(), [&](const Candidate& c) {
-                        return resolves(ways[j].normal, ways[j].depth, c.pair);
+                    needed[i] = !std::all_of(groups[i].patch->begin(), groups[i].patch->end(), [&](const Candidate& c) {
+                        return resolves(groups[j].way.normal, groups[j].way.depth, c.pair);
                     });
-        for (uint32_t i = 0; i < count; ++i)
-            if (needed[i]) way_[ways_] = ways[i], points_[ways_] = deepest[i], ++ways_;
+        for (uint32_t i = 0; i < count && ways_ < kManifolds; ++i)
+            if (needed[i]) way_[ways_] = groups[i].way, points_[ways_] = groups[i].deepest, ++ways_;
         settled_ = true;
     }
     // After both: patches with points, at least one if any pair met.
@@ -242,8 +250,8 @@ private:
     template <class Use> void own(const MeetingPair& pair, double limit, Use&& use) const {
         const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
         if (in_a && in_b) {
-            const TriangleContact found = contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b),
-                                                  d_.options.margin, limit);
+            const TriangleContact found =
+                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), d_.options.margin, limit);
             return for_each_point(found, pair, [&](const Contact& c) { use(c, found.faces); });
         }
         if (in_a) return own_mixed(pair, surrounded_a(pair.triangle_a), ellipsoid_b(pair), 1, use);
@@ -310,8 +318,7 @@ private:
     // A vertex of the one body that lies in the other, its place in A's frame.
     void add_deepest(const MeetingPair& pair, const dvec3& n, double most, bool of_a, Patch& to) {
         const dvec3 up = of_a ? n : -n; // out of the body
-        const uint32_t vertex =
-            (of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b)).top(up).vertex;
+        const uint32_t vertex = (of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b)).top(up).vertex;
         const dvec3 here = to_double((of_a ? d_.a : d_.b).tree.vertex(vertex));
         const dvec3 at = of_a ? here : d_.b_to_a.rotation * here + d_.b_to_a.translation;
         // Cast in the other body's frame, against `up`.

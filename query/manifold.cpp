@@ -71,9 +71,7 @@ uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const no
     dvec3 mean(0);
     for (const Candidate& c : sieve_) mean += c.middle / double{kSieve};
     const double as_deep = sieve_[0].depth - std::min(apart, kSameDepth * std::abs(sieve_[0].depth));
-    const auto outermost = [&](const Candidate& c) {
-        return c.depth >= as_deep ? glm::length(c.middle - mean) : -1;
-    };
+    const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
     if (!take(-0.5, outermost)) out[count++] = sieve_[0];
     const dvec3 p = out[0].middle;
     if (!take(apart, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
@@ -99,23 +97,12 @@ void Patches::add(const dvec3& normal, const Candidate& candidate, double weight
         if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, apart_);
         if (patches_[i].depth() < shallowest->depth()) shallowest = &patches_[i];
     }
-    if (count_ < kManifolds)
+    if (count_ < kMost)
         shallowest = &patches_[count_++];
     else if (!(candidate.depth > shallowest->depth()))
         return;
     *shallowest = Patch(normal);
     shallowest->add(normal, candidate, weight, overlap, apart_);
-}
-
-uint32_t Patches::sorted(const Patch* (&out)[kManifolds]) const noexcept {
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < count_; ++i)
-        if (!patches_[i].empty()) {
-            uint32_t at = count++;
-            for (; at > 0 && patches_[i].depth() > out[at - 1]->depth(); --at) out[at] = out[at - 1];
-            out[at] = &patches_[i];
-        }
-    return count;
 }
 
 } // namespace prolate::query

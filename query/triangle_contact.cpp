@@ -61,9 +61,8 @@ public:
                 for (const double sign : {1.0, -1.0}) edges(i, j, sign);
         Axis best;
         for (uint32_t left = count_; left > 0; --left) { // the least first: they can only grow
-            Axis* const next = std::min_element(axes_, axes_ + left, [](const Axis& x, const Axis& y) {
-                return x.overlap < y.overlap;
-            });
+            Axis* const next = std::min_element(axes_, axes_ + left,
+                                                [](const Axis& x, const Axis& y) { return x.overlap < y.overlap; });
             if (!(next->overlap < limit)) break;
             const double overlap = next->overlap + rise(*next, a, b, limit - next->overlap);
             if (overlap < limit) best = *next, best.overlap = limit = overlap;

@@ -1,5 +1,5 @@
-// How do two triangles that meet, or nearly do, touch, and how can their bodies be taken apart? For contacts; scalar, in
-// double precision.
+// How do two triangles that meet, or nearly do, touch, and how can their bodies be taken apart? For contacts; scalar,
+// in double precision.
 //
 // The normal is one of the separating axis theorem (Gottschalk, Lin and Manocha 1996): a face's, or the product of two
 // edges, which must win clearly, for a face is the steadier normal, and must be where the triangles touch along it. Of
@@ -42,8 +42,8 @@ struct Surrounded {
     PlacedTriangle triangle; ///< in A's frame
     bool closed = false;     ///< its mesh is
     const Hills* hills = nullptr;
-    Triangle corners{};                      ///< their vertices
-    const glm::dmat3* rotation = nullptr;    ///< from the tree's frame to A's; null: none
+    Triangle corners{};                   ///< their vertices
+    const glm::dmat3* rotation = nullptr; ///< from the tree's frame to A's; null: none
 
     /// By how much the surface around a corner, or an edge that `up` is perpendicular to, rises above it along `up`, in
     /// A's frame. What is above `enough` may be too little. 0 without hills.

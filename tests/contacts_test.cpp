@@ -360,8 +360,7 @@ double lowest_along(const Mesh& mesh, const Quat& rotation, const Point& up) {
 double deepest_of(const ContactManifolds& m) {
     double out = -HUGE_VAL;
     for (uint32_t i = 0; i < m.count; ++i)
-        for (uint32_t k = 0; k < m.manifolds[i].count; ++k)
-            out = std::max(out, double{m.manifolds[i].points[k].depth});
+        for (uint32_t k = 0; k < m.manifolds[i].count; ++k) out = std::max(out, double{m.manifolds[i].points[k].depth});
     return out;
 }
 
