@@ -140,7 +140,7 @@ void distance_of_triangles(benchmark::State& state, double gap) {
     triangles(state, gap, [](const auto& a, const auto& b) { return query::distance(a, b); });
 }
 void contact_of_triangles(benchmark::State& state, double gap) {
-    triangles(state, gap, [](const auto& a, const auto& b) { return query::contact(a, b); });
+    triangles(state, gap, [](const auto& a, const auto& b) { return query::contact({a}, {b}, 0); });
 }
 BENCHMARK_CAPTURE(distance_of_triangles, gap_1e_1, 1e-1);
 BENCHMARK_CAPTURE(distance_of_triangles, gap_1e_3, 1e-3);

@@ -13,6 +13,8 @@
 
 #include "src/hash.hpp"
 
+#include <prolate/tree.hpp>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -27,6 +29,9 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
 bool is_finite(const Vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+bool within_limit(const Vec3& v) {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= kLargestCoordinate;
 }
 
 // For each vertex, the first vertex at the same position.
@@ -129,8 +134,11 @@ Result<CleanMesh> clean_or_throw(MeshView input) {
     if (input.triangles.empty()) return Error{ErrorCode::bad_mesh, "the mesh has no triangles"};
     if (input.vertices.size() > kMost || input.triangles.size() > kMost)
         return Error{ErrorCode::bad_mesh, "the mesh has too many vertices or triangles (2^32 or more)"};
-    for (size_t i = 0; i < input.vertices.size(); ++i)
+    for (size_t i = 0; i < input.vertices.size(); ++i) {
         if (!is_finite(input.vertices[i])) return Error{ErrorCode::bad_mesh, "vertex coordinate is not finite", i};
+        if (!within_limit(input.vertices[i]))
+            return Error{ErrorCode::bad_mesh, "vertex coordinate beyond 1.9e22 m (2^74 m): scale the mesh down", i};
+    }
     for (size_t i = 0; i < input.triangles.size(); ++i)
         for (const uint32_t corner : input.triangles[i])
             if (corner >= input.vertices.size())

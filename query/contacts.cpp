@@ -1,17 +1,20 @@
 // Contact manifolds: all pairs of leaves that meet, as collide_all() finds them, each turned into points with a normal
 // (triangle_contact.hpp, gap.hpp), and all of these into a few manifolds (manifold.hpp).
 //
-// What a pair of triangles says for itself may be wrong: their edges may be internal ones of a flat surface, and a
-// small triangle that stands out of a face by little is parted soonest sideways. So the pairs are gone through twice.
-// The first time for the normals: those of faces make patches, others wait and count if no patch resolves them, that
-// is, unless they are parted once the bodies are moved along its normal as far as that patch needs anyway. Patches all
+// The pairs are gone through twice. The first time for the normals: of each pair that along which its surroundings
+// overlap least (triangle_contact.hpp), if that is less than what a patch found before needs to resolve it, that is, to
+// have it parted once the bodies are moved along the patch's normal. Normals of faces make patches, others wait and
+// count if no patch resolves them that is no deeper. Then the deepest vertices of each patch are found, and patches all
 // of which another one resolves are dropped. The second time for the points: of each pair along the normal of the first
 // patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
 //
 // Bodies are taken in an order that depends on their trees alone, if these differ: poses change from step to step, and
 // what follows from the order should not.
 //
-// Complexity: twice collide_all()'s, and some microseconds for each pair that meets.
+// Complexity: twice collide_all()'s, and some microseconds for each pair that meets; for each patch up to 18 climbs and
+// rays.
+#include "query/climb.hpp"
+#include "query/convert.hpp"
 #include "query/descent.hpp"
 #include "query/enclosure.hpp"
 #include "query/gap.hpp"
@@ -21,6 +24,7 @@
 #include "query/triangle_ellipsoid.hpp"
 
 #include <prolate/contacts.hpp>
+#include <prolate/raycast.hpp>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -76,13 +80,17 @@ struct Contact {
     dvec3 normal, middle;
     double depth;
     Part a, b;
+    double overlap; // of the bodies around the pair
 };
 
 class Collector {
 public:
-    Collector(Descent& descent, bool swapped, const ContactManifolds& last, const RelativePose& to_world)
-        : d_(descent), swapped_(swapped), last_(last), closed_a_(closed(descent.a.tree)),
+    Collector(Descent& descent, QueryContext& context, bool swapped, const ContactManifolds& last,
+              const RelativePose& to_world)
+        : d_(descent), context_(context), swapped_(swapped), last_(last), closed_a_(closed(descent.a.tree)),
           closed_b_(closed(descent.b.tree)),
+          hills_a_(descent.a.tree, descent.other_tests, descent.options.max_pair_tests),
+          hills_b_(descent.b.tree, descent.other_tests, descent.options.max_pair_tests),
           size_(std::min(place(d_.a.tree.root()).size, place(d_.b.tree.root()).size)), patches_(kSamePoint * size_) {
         for (uint32_t i = 0; i < std::min(last.count, kManifolds); ++i) {
             const Vec3& n = last.manifolds[i].normal;
@@ -93,23 +101,34 @@ public:
         descent.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
         descent.each_user = this;
     }
-    // Between the two passes: settles the normals.
+    // Between the two passes: settles the normals and depths.
     void settle() {
         flush();
-        const Patch* found[kManifolds];
-        const uint32_t count = patches_.sorted(found);
-        bool needed[kManifolds] = {};
-        for (uint32_t i = 0; i < count; ++i) needed[i] = true;
-        for (uint32_t i = count; i-- > 0;) { // the shallowest first
+        struct Group {
+            const Patch* patch;
+            Way way;
+            Patch deepest;
+        };
+        Group groups[Patches::kMost];
+        uint32_t count = 0;
+        patches_.for_each([&](const Patch& p) {
+            Group group{&p, {p.normal(), p.depth()}, Patch(p.normal())};
+            add_deepest(p, group.deepest);
+            group.way.depth = std::max(group.way.depth, group.deepest.depth());
+            uint32_t at = count++; // the deepest first
+            for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];
+            groups[at] = group;
+        });
+        bool needed[Patches::kMost];
+        std::fill_n(needed, count, true);
+        for (uint32_t i = 0; i < count; ++i)
             for (uint32_t j = 0; j < count && needed[i]; ++j)
                 if (j != i && needed[j])
-                    needed[i] = !std::all_of(found[i]->begin(), found[i]->end(),
-                                             [&](const Candidate& c) { return resolves(*found[j], c.pair); });
-        }
-        for (uint32_t i = 0; i < count; ++i)
-            if (needed[i])
-                way_[ways_] = {found[i]->normal(), found[i]->depth()}, points_[ways_] = Patch(way_[ways_].normal),
-                ++ways_;
+                    needed[i] = !std::all_of(groups[i].patch->begin(), groups[i].patch->end(), [&](const Candidate& c) {
+                        return resolves(groups[j].way.normal, groups[j].way.depth, c.pair);
+                    });
+        for (uint32_t i = 0; i < count && ways_ < kManifolds; ++i)
+            if (needed[i]) way_[ways_] = groups[i].way, points_[ways_] = groups[i].deepest, ++ways_;
         settled_ = true;
     }
     // After both: patches with points, at least one if any pair met.
@@ -120,7 +139,7 @@ public:
         if (count > 0 || d_.found == 0) return count;
         const Contact c = last_resort();
         points_[0] = Patch(c.normal);
-        points_[0].add(c.normal, candidate(c), 0, patches_.apart());
+        points_[0].add(c.normal, candidate(c), 0, c.overlap, patches_.apart());
         out[0] = &points_[0];
         return 1;
     }
@@ -136,7 +155,11 @@ private:
     void add(const MeetingPair& pair) {
         if (!settled_) {
             if (d_.found == 0) first_ = pair;
-            return own(pair, [&](const Contact& c, bool certain) {
+            double limit = HUGE_VAL;
+            patches_.for_each([&](const Patch& p) {
+                if (resolves(p.normal(), p.overlap(), pair)) limit = std::min(limit, p.overlap());
+            });
+            return own(pair, limit, [&](const Contact& c, bool certain) {
                 if (certain) return take(c);
                 if (waiting_count_ == kWaiting) flush();
                 waiting_[waiting_count_++] = c;
@@ -144,30 +167,35 @@ private:
         }
         if (pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle)
             for (uint32_t i = 0; i < ways_; ++i)
-                if (resolves(way_[i], pair) && along(way_[i].normal, pair, points_[i])) return;
-        own(pair, [&](const Contact& c, bool) {
+                if (resolves(way_[i].normal, way_[i].depth, pair) && along(way_[i].normal, pair, points_[i])) return;
+        own(pair, HUGE_VAL, [&](const Contact& c, bool) {
             for (uint32_t i = 0; i < ways_; ++i)
-                if (points_[i].takes(c.normal)) return points_[i].add(c.normal, candidate(c), 0, patches_.apart());
+                if (points_[i].takes(c.normal))
+                    return points_[i].add(c.normal, candidate(c), 0, c.overlap, patches_.apart());
         });
     }
 
-    // Is the pair parted once the bodies are moved along a patch's normal as far as that patch needs?
-    template <class Of> bool resolves(const Of& patch, const MeetingPair& pair) const {
-        const auto [n, depth] = way_of(patch);
+    // Is the pair parted once the bodies are moved by this depth along n?
+    bool resolves(const dvec3& n, double depth, const MeetingPair& pair) const {
         const double high =
             pair.triangle_a != kNoTriangle ? highest(triangle_a(pair), n) : highest(ellipsoid_a(pair), n);
         const double low =
             pair.triangle_b != kNoTriangle ? -highest(triangle_b(pair), -n) : -highest(ellipsoid_b(pair), -n);
         return high - low <= depth + patches_.apart();
     }
-    static Way way_of(const Patch& patch) { return {patch.normal(), patch.depth()}; }
-    static const Way& way_of(const Way& way) { return way; }
 
     PlacedTriangle triangle_a(const MeetingPair& pair) const { return place(d_.a.tree, pair.triangle_a); }
     PlacedTriangle triangle_b(const MeetingPair& pair) const { return place(d_.b.tree, pair.triangle_b, d_.b_to_a); }
     PlacedEllipsoid ellipsoid_a(const MeetingPair& pair) const { return place(d_.a.tree.ellipsoid(pair.node_a)); }
     PlacedEllipsoid ellipsoid_b(const MeetingPair& pair) const {
         return place(d_.b.tree.ellipsoid(pair.node_b), d_.b_to_a);
+    }
+    Surrounded surrounded_a(uint32_t triangle) const {
+        return {place(d_.a.tree, triangle), closed_a_, &hills_a_, d_.a.tree.triangle(triangle)};
+    }
+    Surrounded surrounded_b(uint32_t triangle) const {
+        return {place(d_.b.tree, triangle, d_.b_to_a), closed_b_, &hills_b_, d_.b.tree.triangle(triangle),
+                &d_.b_to_a.rotation};
     }
     static Part whole(uint32_t node, uint32_t triangle) {
         return triangle != kNoTriangle ? Part{Part::Kind::triangle, triangle} : Part{Part::Kind::node, node};
@@ -182,7 +210,7 @@ private:
     // ---- points along the normal of a patch; false if the pair should speak for itself ----
 
     bool along(const dvec3& n, const MeetingPair& pair, Patch& patch) const {
-        const auto put = [&](const Contact& c) { patch.add(n, candidate(c), 0, patches_.apart()); };
+        const auto put = [&](const Contact& c) { patch.add(n, candidate(c), 0, c.overlap, patches_.apart()); };
         if (pair.triangle_a != kNoTriangle && pair.triangle_b != kNoTriangle) {
             const TriangleContact found = contact_along(n, triangle_a(pair), triangle_b(pair), d_.options.margin);
             for_each_point(found, pair, put);
@@ -202,7 +230,7 @@ private:
             if (glm::dot(face, glm::cross(t.corner[(i + 1) % 3] - t.corner[i], below - t.corner[i])) < 0) return true;
         if (depth >= -d_.options.margin)
             put({pair, n, 0.5 * (lowest + below), depth, whole(pair.node_a, pair.triangle_a),
-                 whole(pair.node_b, pair.triangle_b)});
+                 whole(pair.node_b, pair.triangle_b), depth});
         return true;
     }
     template <class Put> void for_each_point(const TriangleContact& found, const MeetingPair& pair, Put&& put) const {
@@ -213,65 +241,108 @@ private:
                 return beside ? whole(0, triangle) : part_of(tree, triangle, feature);
             };
             put(Contact{pair, found.normal, 0.5 * (p.on_a + p.on_b), p.depth, part(d_.a.tree, pair.triangle_a, p.of_a),
-                        part(d_.b.tree, pair.triangle_b, p.of_b)});
+                        part(d_.b.tree, pair.triangle_b, p.of_b), found.overlap});
         }
     }
 
-    // ---- what a pair says for itself: use(contact, certain) ----
+    // ---- what a pair says for itself: use(contact, certain), if it overlaps by less than `limit` ----
 
-    template <class Use> void own(const MeetingPair& pair, Use&& use) const {
+    template <class Use> void own(const MeetingPair& pair, double limit, Use&& use) const {
         const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
         if (in_a && in_b) {
             const TriangleContact found =
-                contact(triangle_a(pair), closed_a_, triangle_b(pair), closed_b_, d_.options.margin);
+                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), d_.options.margin, limit);
             return for_each_point(found, pair, [&](const Contact& c) { use(c, found.faces); });
         }
-        if (in_a) return own_mixed(pair, triangle_a(pair), closed_a_, ellipsoid_b(pair), 1, use);
-        if (in_b) return own_mixed(pair, triangle_b(pair), closed_b_, ellipsoid_a(pair), -1, use);
+        if (in_a) return own_mixed(pair, surrounded_a(pair.triangle_a), ellipsoid_b(pair), 1, use);
+        if (in_b) return own_mixed(pair, surrounded_b(pair.triangle_b), ellipsoid_a(pair), -1, use);
         const PlacedEllipsoid x = ellipsoid_a(pair), y = ellipsoid_b(pair);
         const double tolerance = kTolerance * std::min(x.size, y.size);
         Gap gap = distance_of(x, y, tolerance);
         if (!(gap.lower > 0)) gap = depth_of(x, y, tolerance, gap.normal);
         use(Contact{pair, gap.normal, 0.5 * (gap.point_a + gap.point_b), -gap.lower, whole(pair.node_a, kNoTriangle),
-                    whole(pair.node_b, kNoTriangle)},
+                    whole(pair.node_b, kNoTriangle), -gap.lower},
             true);
     }
     // A triangle and an ellipsoid; `sign`: 1 if the triangle is A's, so that normals lead from it, else -1.
     template <class Use>
-    void own_mixed(const MeetingPair& pair, const PlacedTriangle& t, bool closed, const PlacedEllipsoid& e, double sign,
+    void own_mixed(const MeetingPair& pair, const Surrounded& around, const PlacedEllipsoid& e, double sign,
                    Use&& use) const {
+        const PlacedTriangle& t = around.triangle;
         const dvec3 face = glm::cross(t.corner[1] - t.corner[0], t.corner[2] - t.corner[0]);
         const auto hand_on = [&](const dvec3& n, const dvec3& middle, double depth) {
             const bool of_face = std::abs(glm::dot(n, face)) > kSameAsFace * glm::length(face);
             use(Contact{pair, sign * n, middle, depth, whole(pair.node_a, pair.triangle_a),
-                        whole(pair.node_b, pair.triangle_b)},
+                        whole(pair.node_b, pair.triangle_b), depth},
                 of_face);
         };
         const TriangleDistance d = distance(t, e);
         const dvec3 between = d.on_b - d.on_a;
         const double length = glm::length(between);
         if (d.lower > 0) return hand_on(between / length, 0.5 * (d.on_a + d.on_b), -length);
-        // In each other: the least depth along the face's normal, or away from the nearest points of the edges.
+        // In each other: the least depth along the face's normal, or away from the nearest points of the edges, unless
+        // the surface goes on there.
         double least = HUGE_VAL;
         dvec3 best(0, 0, 1), deepest = e.center;
-        const auto consider = [&](const dvec3& v) {
+        const auto consider = [&](const dvec3& v, bool of_face) {
             const double size = glm::length(v);
             if (!(size > 0)) return;
             const dvec3 n = v / size, w = n * e.factor;
-            const double depth = highest(t, n) - (glm::dot(n, e.center) - glm::length(w));
+            double depth = highest(t, n) - (glm::dot(n, e.center) - glm::length(w));
+            if (depth < least && !of_face) depth += around.rise(around.highest(n), n, least - depth);
             if (depth < least) least = depth, best = n, deepest = e.center - e.factor * (w / glm::length(w));
         };
-        consider(face);
-        if (!closed) consider(-face);
+        consider(face, true);
+        if (!around.closed) consider(-face, true);
         for (size_t i = 0; i < 3; ++i) {
             const dvec3 edge = t.corner[(i + 1) % 3] - t.corner[i], from = e.center - t.corner[i];
             const double square = glm::dot(edge, edge);
             const double s = square > 0 ? std::clamp(glm::dot(from, edge) / square, 0.0, 1.0) : 0;
             const dvec3 away = from - s * edge;
-            if (!closed || glm::dot(away, face) > 0) consider(away);
+            if (!around.closed || glm::dot(away, face) > 0) consider(away, false);
         }
         hand_on(best, deepest + 0.5 * least * best, least);
     }
+    // ---- the deepest points ----
+
+    // What of a finely meshed body is deepest in the other meets no triangle. From the pairs of a patch the bodies are
+    // climbed along its normal to what is deepest around there, and a ray from it finds the other body's surface.
+    void add_deepest(const Patch& from, Patch& to) {
+        const dvec3 n = from.normal();
+        for (const Candidate& c : from) {
+            if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
+            add_deepest(c.pair, n, from.overlap(), true, to);
+            add_deepest(c.pair, n, from.overlap(), false, to);
+        }
+    }
+    // A vertex of the one body that lies in the other, its place in A's frame.
+    void add_deepest(const MeetingPair& pair, const dvec3& n, double most, bool of_a, Patch& to) {
+        const dvec3 up = of_a ? n : -n; // out of the body
+        const uint32_t vertex = (of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b)).top(up).vertex;
+        const dvec3 here = to_double((of_a ? d_.a : d_.b).tree.vertex(vertex));
+        const dvec3 at = of_a ? here : d_.b_to_a.rotation * here + d_.b_to_a.translation;
+        // Cast in the other body's frame, against `up`.
+        const RelativePose a_to_b = inverse(d_.b_to_a);
+        const dvec3 start = of_a ? a_to_b.rotation * at + a_to_b.translation : at;
+        const dvec3 direction = of_a ? -(a_to_b.rotation * up) : -up;
+        const RaycastResult hit = raycast((of_a ? d_.b : d_.a).tree, Pose{},
+                                          {to_float(start), to_float(direction), static_cast<float>(most) + 1},
+                                          context_, {.max_pair_tests = d_.left()});
+        d_.other_tests += hit.stats.pair_tests + hit.stats.triangle_tests;
+        if (hit.triangle == kNoTriangle) return;
+        MeetingPair found = pair;
+        (of_a ? found.triangle_b : found.triangle_a) = hit.triangle;
+        const PlacedTriangle t = of_a ? triangle_b(found) : triangle_a(found);
+        const dvec3 face = glm::cross(t.corner[1] - t.corner[0], t.corner[2] - t.corner[0]);
+        const double facing = -glm::dot(face, up); // of the outside, which the ray must leave through
+        if (!((of_a ? closed_b_ : closed_a_) ? facing > 0 : facing != 0)) return;
+        const double depth = glm::dot(face, t.corner[0] - at) / facing;
+        if (!(depth >= 0 && depth <= most + patches_.apart())) return;
+        const Part part{Part::Kind::vertex, vertex}, other{Part::Kind::face};
+        to.add(n, candidate({pair, n, at - 0.5 * depth * up, depth, of_a ? part : other, of_a ? other : part, depth}),
+               0, depth, patches_.apart());
+    }
+
     // The first pair's, through whatever side.
     Contact last_resort() {
         closed_a_ = closed_b_ = false;
@@ -280,9 +351,10 @@ private:
                     {0, 0, 0},
                     0,
                     whole(first_.node_a, first_.triangle_a),
-                    whole(first_.node_b, first_.triangle_b)};
+                    whole(first_.node_b, first_.triangle_b),
+                    0};
         bool any = false;
-        own(first_, [&](const Contact& c, bool) {
+        own(first_, HUGE_VAL, [&](const Contact& c, bool) {
             if (!any) out = c, any = true;
         });
         if (any) return out;
@@ -303,19 +375,28 @@ private:
     }
     void take(const Contact& c) {
         const double weight = std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_;
-        patches_.add(c.normal, candidate(c), weight);
+        patches_.add(c.normal, candidate(c), weight, c.overlap);
     }
-    // What waits counts if no patch resolves it.
+    // What waits counts if no patch resolves it, or only one that is deeper than the pair.
     void flush() {
-        for (uint32_t i = 0; i < waiting_count_; ++i)
-            if (!patches_.any([&](const Patch& p) { return resolves(p, waiting_[i].pair); })) take(waiting_[i]);
+        for (uint32_t i = 0; i < waiting_count_; ++i) {
+            const Contact& c = waiting_[i];
+            bool resolved = false;
+            patches_.for_each([&](const Patch& p) {
+                resolved = resolved || (resolves(p.normal(), p.overlap(), c.pair) &&
+                                        (c.overlap < 0 || p.overlap() <= c.overlap + patches_.apart()));
+            });
+            if (!resolved) take(c);
+        }
         waiting_count_ = 0;
     }
 
     Descent& d_;
+    QueryContext& context_; // free between the passes
     const bool swapped_;
     const ContactManifolds& last_;
     bool closed_a_, closed_b_, settled_ = false;
+    const Hills hills_a_, hills_b_;
     const double size_;
     dvec3 last_normals_[kManifolds];
     MeetingPair first_;
@@ -327,10 +408,6 @@ private:
     Way way_[kManifolds];
     Patch points_[kManifolds]; // of the second
 };
-
-Vec3 to_float(const dvec3& v) {
-    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
 
 ContactPoint point_of(const Candidate& c, const dvec3& normal, bool swapped, const RelativePose& to_world) {
     ContactPoint out;
@@ -361,11 +438,12 @@ void match(Manifold& manifold, const ContactManifolds& last) {
 }
 
 // In the fixed order of bodies.
-ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactManifolds& manifolds) {
+ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactManifolds& manifolds,
+                  QueryContext& context) {
     const RelativePose to_world = relative_pose(Pose{}, pose_a);
     const ContactManifolds last = manifolds;
     manifolds = {};
-    Collector collector(descent, swapped, last, to_world);
+    Collector collector(descent, context, swapped, last, to_world);
     descent.all = true;
     ContactResult out;
     out.verdict = descend(descent);
@@ -381,7 +459,7 @@ ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactMan
 
     if (descent.found > 0) {
         collector.settle();
-        descent.found = 0, descent.stats.pair_tests = 0; // what they count is known
+        descent.found = 0, descent.stats = {}, descent.other_tests = 0; // what they count is known
         descend(descent);
     }
     const Patch* patches[kManifolds];
@@ -410,7 +488,7 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
     const bool swap = different ? query::before(b, a) : query::must_swap(a, pose_a, b, pose_b);
     query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
                                   : query::Descent(a, pose_a, b, pose_b, context, options);
-    return query::run(descent, swap ? pose_b : pose_a, swap, manifolds);
+    return query::run(descent, swap ? pose_b : pose_a, swap, manifolds, context);
 }
 
 } // namespace prolate

@@ -81,7 +81,7 @@ private:
         // The roots, as if B's were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         pair_tests_ = 1;
-        if (test_all(kOpenB, 0, 1, 0, d_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return Verdict::overlapping;
+        if (test_all(kOpenB, 0, 1, 0, d_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
         while (size_ > 0) {
             const auto e = stack_[--size_];
             const uint32_t open = e.flags & kOpenB;
@@ -98,7 +98,7 @@ private:
             pair_tests_ += count; // also those that it may not come to
             if (count <= kBlockLanes ? test(open, first, count, other, e.flags & kOtherIsLeaf)
                                      : test_all(open, first, count, other, e.flags & kOtherIsLeaf))
-                return Verdict::overlapping;
+                return stopped();
         }
         return Verdict::separated;
     }
@@ -142,7 +142,12 @@ private:
         return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
     }
 
-    uint64_t budget() const { return d_.options.max_pair_tests - pair_tests_; }
+    Verdict stopped() const { return d_.out_of_tests ? Verdict::undecided : Verdict::overlapping; }
+
+    uint64_t budget() const { // d_.stats has the triangles' tests, and the nodes' later
+        const uint64_t left = d_.left();
+        return left - std::min(left, pair_tests_ - d_.stats.pair_tests);
+    }
 
     // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
@@ -197,6 +202,7 @@ private:
 
     // Decides on these lanes, the deepest first, against the other tree's leaf. True to stop the query.
     HWY_NOINLINE bool decide(uint32_t open, uint32_t first, uint32_t lanes, uint32_t other, const Kept& kept) {
+        d_.stats.pair_tests = pair_tests_;
         while (lanes != 0) {
             auto lane = static_cast<uint32_t>(std::countr_zero(lanes));
             for (uint32_t rest = lanes & (lanes - 1); rest != 0; rest &= rest - 1) {

@@ -6,6 +6,7 @@
 
 #include <prolate/collide.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 
@@ -37,6 +38,8 @@ struct Descent {
     uint64_t found = 0;
     void (*each)(void* user, const MeetingPair& pair) = nullptr; ///< is handed all pairs taken, if not null
     void* each_user = nullptr;
+    uint64_t other_tests = 0;  ///< that `each` did, of the same budget
+    bool out_of_tests = false; ///< the budget ran out within a leaf
 
     /// Nodes are parted only if they are farther apart than options.margin + skin, metres. Leaves that are nearer, but
     /// beyond options.margin, shrink the skin to what they leave; so if the bodies turn out to be separated, they are
@@ -55,13 +58,21 @@ struct Descent {
     bool meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept;
     /// Takes a pair that meets. True to stop the query.
     bool take(const MeetingPair& pair) noexcept;
-    /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any.
+    /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any. False
+    /// too if it is out of tests.
     bool meets(const MeetingPair& pair) noexcept;
+
+    /// Tests left of the budget.
+    uint64_t left() const noexcept {
+        const uint64_t used = stats.tests() + other_tests;
+        return options.max_pair_tests - std::min(used, options.max_pair_tests);
+    }
 
     /// Starts with this skin.
     void set_skin(float distance) noexcept;
 
 private:
+    bool spend(uint64_t tests) noexcept;
     template <class Apart> bool parted(Apart&& apart) noexcept;
     bool apart_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept;
     float least_skin_ = 0;

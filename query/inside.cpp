@@ -25,7 +25,7 @@ public:
           step_exponent_(tree.lattice().step_exponent) {}
 
     std::optional<int64_t> run() {
-        if (tree_.is_leaf(0)) return crossings_of(tree_.triangles(0), {});
+        if (tree_.is_leaf(0)) return add_crossings(tree_.triangles(0), {}) ? std::optional(winding_) : std::nullopt;
         const std::optional<Start> start = shortest();
         if (!start) return {};
         const bool finished = start->direction.axis == 0   ? walk<0>(*start)
@@ -43,8 +43,9 @@ private:
         Family family; // the children of the root
     };
 
+    uint64_t left() const { return most_tests_ - std::min(most_tests_, stats_.tests()); }
     bool take(uint32_t count) {
-        if (count > most_tests_ - stats_.pair_tests) return false;
+        if (count > left()) return false;
         stats_.pair_tests += count, ++stats_.block_tests;
         return true;
     }
@@ -102,7 +103,7 @@ private:
             const uint32_t count = load_le<uint8_t>(block + kBlockCount + lane);
             const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
             if (count >= kTriangleLeaf) {
-                winding_ += crossings_of({first, count - kTriangleLeaf}, start.direction);
+                if (!add_crossings({first, count - kTriangleLeaf}, start.direction)) return false;
                 continue;
             }
             stack[++depth] = {first / kBlockLanes, count, 0};
@@ -110,9 +111,12 @@ private:
         }
     }
 
-    int64_t crossings_of(const TriangleRange& triangles, const AxisDirection& direction) {
+    // A leaf's crossings. False if the tests run out.
+    bool add_crossings(const TriangleRange& triangles, const AxisDirection& direction) {
+        if (triangles.count > left()) return false;
         stats_.triangle_tests += triangles.count;
-        return crossings(tree_, triangles, point_.position, direction);
+        winding_ += crossings(tree_, triangles, point_.position, direction);
+        return true;
     }
 
     const TreeView& tree_;

@@ -29,7 +29,7 @@ struct PlacedPoint {
 PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept;
 
 /// Winding number of the surface of `tree`, which has triangles and is closed, around the point. Counts in `stats`;
-/// empty if stats.pair_tests would exceed `most_tests`.
+/// empty if stats.tests() would exceed `most_tests`.
 std::optional<int64_t> winding_number(const TreeView& tree, const PlacedPoint& point, QueryStats& stats,
                                       uint64_t most_tests) noexcept;
 

@@ -46,6 +46,15 @@ template <class Apart> bool Descent::parted(Apart&& apart) noexcept {
     return apart(options.margin);
 }
 
+// Counts tests of triangles that were done. False if the budget does not hold so many: they are as if not done, so
+// that a budget ends a query just where its count says.
+bool Descent::spend(uint64_t tests) noexcept {
+    const uint64_t rest = left();
+    out_of_tests = out_of_tests || tests > rest;
+    stats.triangle_tests += std::min(tests, rest);
+    return !out_of_tests;
+}
+
 bool Descent::take(const MeetingPair& pair) noexcept {
     if (each != nullptr) each(each_user, pair);
     if (found < pairs.size()) pairs[static_cast<size_t>(found)] = pair;
@@ -64,33 +73,34 @@ bool Descent::apart_along(const glm::dvec3& normal, TriangleRange in_a, Triangle
 
 bool Descent::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept {
     const TriangleRange in_a = a.tree.triangles(node_a), in_b = b.tree.triangles(node_b);
-    if (in_a.count == 0 && in_b.count == 0)
-        return meets({node_a, node_b, kNoTriangle, kNoTriangle}) && take({node_a, node_b, kNoTriangle, kNoTriangle});
+    const auto single = [&](uint32_t triangle_a, uint32_t triangle_b) { // true to stop
+        const MeetingPair pair{node_a, node_b, triangle_a, triangle_b};
+        return (meets(pair) && take(pair)) || out_of_tests;
+    };
+    if (in_a.count == 0 && in_b.count == 0) return single(kNoTriangle, kNoTriangle);
     if (in_a.count == 0) {
         for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
-            if (meets({node_a, node_b, kNoTriangle, t}) && take({node_a, node_b, kNoTriangle, t})) return true;
+            if (single(kNoTriangle, t)) return true;
         return false;
     }
     if (in_b.count == 0) {
         for (uint32_t t = in_a.first; t < in_a.first + in_a.count; ++t)
-            if (meets({node_a, node_b, t, kNoTriangle}) && take({node_a, node_b, t, kNoTriangle})) return true;
+            if (single(t, kNoTriangle)) return true;
         return false;
     }
-    if (normal != glm::dvec3(0) && apart_along(normal, in_a, in_b)) {
-        ++stats.triangle_tests;
-        return false;
-    }
+    if (normal != glm::dvec3(0) && apart_along(normal, in_a, in_b)) return !spend(1);
     LeafResult first;
     const auto test = [&](TriangleRange some_a, TriangleRange some_b, float distance) {
         first = test_leaves(a.tree, some_a, b.tree, some_b, b_to_a, distance);
-        stats.triangle_tests += first.pair_tests;
-        return !first.meet;
+        return spend(first.pair_tests) && !first.meet;
     };
     if (parted([&](float distance) { return test(in_a, in_b, distance); })) return false;
+    if (out_of_tests) return true;
     if (!all) return take({node_a, node_b, first.triangle_a, first.triangle_b});
     for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
         for (TriangleRange rest = in_a; rest.count > 0;) {
             if (test(rest, {t, 1}, options.margin)) break;
+            if (out_of_tests) return true;
             take({node_a, node_b, first.triangle_a, t});
             rest = {first.triangle_a + 1, in_a.first + in_a.count - (first.triangle_a + 1)};
         }
@@ -99,7 +109,7 @@ bool Descent::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) n
 
 bool Descent::meets(const MeetingPair& pair) noexcept {
     const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
-    if (in_a || in_b) ++stats.triangle_tests;
+    if ((in_a || in_b) && !spend(1)) return false;
     return !parted([&](float distance) {
         if (in_a && in_b)
             return apart(place(a.tree, pair.triangle_a), place(b.tree, pair.triangle_b, b_to_a), distance);

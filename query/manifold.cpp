@@ -12,6 +12,7 @@ using glm::dvec3;
 
 constexpr double kSameNormal = 0.9; // cosine
 constexpr double kPreferKnown = 1.1;
+constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
 
 // What is known keeps its place against others that are no better than rounding.
 bool instead(const Candidate& old, const Candidate& other, double ahead, double apart) {
@@ -31,15 +32,17 @@ bool Patch::takes(const dvec3& normal) const noexcept {
     return glm::dot(normal, seed_) > kSameNormal;
 }
 
-void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double apart) noexcept {
+void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap, double apart) noexcept {
     sum_ += weight * normal;
+    overlap_ = std::max(overlap_, overlap);
     const double x = glm::dot(x_, candidate.middle), y = glm::dot(y_, candidate.middle);
     constexpr double kDiagonal = 0.7071067811865476;
     const double values[] = {candidate.depth,     x,  y,  kDiagonal * (x + y),
                              kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y),
                              kDiagonal * (y - x)};
     for (uint32_t i = 0; i < kSieve; ++i) {
-        if (any_ && !instead(sieve_[i], candidate, values[i] - reach_[i], apart)) continue;
+        const double same = i == 0 ? std::min(apart, kSameDepth * std::abs(candidate.depth)) : apart;
+        if (any_ && !instead(sieve_[i], candidate, values[i] - reach_[i], same)) continue;
         reach_[i] = values[i], sieve_[i] = candidate;
     }
     any_ = true;
@@ -67,9 +70,8 @@ uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const no
     // Of what is as deep as the deepest, the outermost: with equal depths a corner, not what lies between two.
     dvec3 mean(0);
     for (const Candidate& c : sieve_) mean += c.middle / double{kSieve};
-    const auto outermost = [&](const Candidate& c) {
-        return c.depth >= sieve_[0].depth - apart ? glm::length(c.middle - mean) : -1;
-    };
+    const double as_deep = sieve_[0].depth - std::min(apart, kSameDepth * std::abs(sieve_[0].depth));
+    const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
     if (!take(-0.5, outermost)) out[count++] = sieve_[0];
     const dvec3 p = out[0].middle;
     if (!take(apart, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
@@ -89,29 +91,18 @@ uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const no
     return count;
 }
 
-void Patches::add(const dvec3& normal, const Candidate& candidate, double weight) noexcept {
+void Patches::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept {
     Patch* shallowest = &patches_[0];
     for (uint32_t i = 0; i < count_; ++i) {
-        if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, apart_);
+        if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, apart_);
         if (patches_[i].depth() < shallowest->depth()) shallowest = &patches_[i];
     }
-    if (count_ < kManifolds)
+    if (count_ < kMost)
         shallowest = &patches_[count_++];
     else if (!(candidate.depth > shallowest->depth()))
         return;
     *shallowest = Patch(normal);
-    shallowest->add(normal, candidate, weight, apart_);
-}
-
-uint32_t Patches::sorted(const Patch* (&out)[kManifolds]) const noexcept {
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < count_; ++i)
-        if (!patches_[i].empty()) {
-            uint32_t at = count++;
-            for (; at > 0 && patches_[i].depth() > out[at - 1]->depth(); --at) out[at] = out[at - 1];
-            out[at] = &patches_[i];
-        }
-    return count;
+    shallowest->add(normal, candidate, weight, overlap, apart_);
 }
 
 } // namespace prolate::query

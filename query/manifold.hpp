@@ -32,10 +32,13 @@ public:
     Patch() = default;
 
     bool takes(const glm::dvec3& normal) const noexcept;
-    /// `weight`: of the normal in the mean. Points nearer to each other than `apart` count as one.
-    void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double apart) noexcept;
+    /// `weight`: of the normal in the mean. `overlap`: what parts the bodies here, along the normal. Points nearer to
+    /// each other than `apart` count as one.
+    void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
+             double apart) noexcept;
     bool empty() const noexcept { return !any_; }
-    double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; }
+    double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; } ///< of the deepest point
+    double overlap() const noexcept { return overlap_; }                      ///< the largest
     const Candidate* begin() const noexcept { return sieve_; } ///< those that stand for all, if there are any
     const Candidate* end() const noexcept { return sieve_ + kSieve; }
     glm::dvec3 normal() const noexcept;
@@ -47,31 +50,31 @@ private:
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
     Candidate sieve_[kSieve];
     double reach_[kSieve]; // what each is the best for: depth, or coordinate
+    double overlap_ = -1e300;
     bool any_ = false;
 };
 
-/// Sorts points into patches by their normals.
+/// Sorts points into patches by their normals: the deepest of them, if there are more.
 class Patches {
 public:
+    static constexpr uint32_t kMost = 8;
+
     explicit Patches(double apart) : apart_(apart) {}
     /// A patch for points of about this normal, if some come.
     void expect(const glm::dvec3& normal) noexcept {
-        if (count_ < kManifolds) patches_[count_++] = Patch(normal);
+        if (count_ < kMost) patches_[count_++] = Patch(normal);
     }
-    void add(const glm::dvec3& normal, const Candidate& candidate, double weight) noexcept;
+    void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept;
     double apart() const noexcept { return apart_; }
-    /// Those that have points, the deepest first. Returns how many.
-    uint32_t sorted(const Patch* (&out)[kManifolds]) const noexcept;
-    /// Is there a patch with points for which is(patch) holds?
-    template <class Is> bool any(Is&& is) const {
+    /// Calls visit(patch) for those that have points.
+    template <class Visit> void for_each(Visit&& visit) const {
         for (uint32_t i = 0; i < count_; ++i)
-            if (!patches_[i].empty() && is(patches_[i])) return true;
-        return false;
+            if (!patches_[i].empty()) visit(patches_[i]);
     }
 
 private:
     double apart_;
-    Patch patches_[kManifolds];
+    Patch patches_[kMost];
     uint32_t count_ = 0;
 };
 

@@ -89,6 +89,7 @@ public:
             if (e.bound > limit_) continue;
             const ChildRange children = c_.body.tree.children(e.node_a);
             if (children.count == 0 || e.node_a >= c_.body.limit_from) {
+                if (c_.body.tree.triangles(e.node_a).count > left()) return !leave_aside(e.bound);
                 if (!c_.meet(e.node_a)) continue;
                 if (c_.any) return leave_aside(std::numeric_limits<float>::infinity());
                 const double limit = c_.best.t / c_.ray.length;
@@ -104,9 +105,13 @@ public:
     }
 
 private:
+    uint64_t left() const { // of the budget
+        return c_.options.max_pair_tests - std::min(c_.options.max_pair_tests, c_.stats.tests());
+    }
+
     // One block: puts the lanes that may be met on the stack, the nearest of the family on top.
     bool test(uint32_t first, uint32_t count) {
-        if (count > c_.options.max_pair_tests - c_.stats.pair_tests) return false;
+        if (count > left()) return false;
         c_.stats.pair_tests += count, ++c_.stats.block_tests;
         c_.body.deepest = std::max(c_.body.deepest, first + count - 1);
         const LaneTag d;

@@ -74,6 +74,7 @@ public:
             const uint32_t node = stack_[--size_].node_a;
             const ChildRange children = q_.body.tree.children(node);
             if (children.count == 0) {
+                if (q_.body.tree.triangles(node).count > left()) return Verdict::undecided;
                 if (q_.meets(node)) return Verdict::overlapping;
                 continue;
             }
@@ -88,10 +89,14 @@ public:
     }
 
 private:
+    uint64_t left() const { // of the budget
+        return q_.options.max_pair_tests - std::min(q_.options.max_pair_tests, q_.result.stats.tests());
+    }
+
     // One block: puts the lanes that may meet the shape on the stack, the deepest last. False if the tests run out.
     bool test(uint32_t first, uint32_t count) {
         QueryStats& stats = q_.result.stats;
-        if (count > q_.options.max_pair_tests - stats.pair_tests) return false;
+        if (count > left()) return false;
         stats.pair_tests += count, ++stats.block_tests;
         q_.body.deepest = std::max(q_.body.deepest, first + count - 1);
         const std::byte* const block = q_.body.tree.block(first / kBlockLanes);

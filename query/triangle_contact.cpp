@@ -25,13 +25,18 @@ struct Axis {
     enum class Kind : uint8_t { none, face_a, face_b, edges };
     Kind kind = Kind::none;
     dvec3 normal{0, 0, 1};
-    double depth = std::numeric_limits<double>::infinity();
+    double overlap = 0; // of the triangles; of edges with what they must win by
     Feature edge_a = 0, edge_b = 0;
 };
 
 dvec3 unit_or_zero(const dvec3& v) {
     const double length = glm::length(v);
     return length > 0 ? v / length : dvec3(0);
+}
+
+Feature highest_corner(const Corners& corners, const dvec3& up) {
+    const double h[3] = {glm::dot(up, corners[0]), glm::dot(up, corners[1]), glm::dot(up, corners[2])};
+    return static_cast<Feature>(std::max_element(h, h + 3) - h);
 }
 
 class Axes {
@@ -45,28 +50,48 @@ public:
     // May B be pushed along n?
     bool leads_out(const dvec3& n) const { return glm::dot(n, out_a_) >= -kAskance && glm::dot(n, out_b_) <= kAskance; }
 
-    Axis least_overlap() {
-        Axis best;
+    // That along which the surroundings overlap least, if by less than `limit`; Axis::overlap is theirs.
+    Axis least_overlap(const Surrounded& a, const Surrounded& b, double limit) {
         for (const double sign : {1.0, -1.0}) {
-            face(best, Axis::Kind::face_a, sign * unit_or_zero(pair_.normal_a));
-            face(best, Axis::Kind::face_b, sign * unit_or_zero(pair_.normal_b));
+            face(Axis::Kind::face_a, sign * unit_or_zero(pair_.normal_a));
+            face(Axis::Kind::face_b, sign * unit_or_zero(pair_.normal_b));
         }
-        const double bias = std::isfinite(best.depth) ? kEdgeBias * std::abs(best.depth) + touching() : 0;
         for (size_t i = 0; i < 3; ++i)
             for (size_t j = 0; j < 3; ++j)
-                for (const double sign : {1.0, -1.0})
-                    edges(best, i, j, sign, best.kind == Axis::Kind::edges ? 0 : bias);
+                for (const double sign : {1.0, -1.0}) edges(i, j, sign);
+        Axis best;
+        for (uint32_t left = count_; left > 0; --left) { // the least first: they can only grow
+            Axis* const next = std::min_element(axes_, axes_ + left,
+                                                [](const Axis& x, const Axis& y) { return x.overlap < y.overlap; });
+            if (!(next->overlap < limit)) break;
+            const double overlap = next->overlap + rise(*next, a, b, limit - next->overlap);
+            if (overlap < limit) best = *next, best.overlap = limit = overlap;
+            *next = axes_[left - 1];
+        }
         return best;
     }
 
 private:
-    double depth(const dvec3& n) const { return pair_.range_a(n).high - pair_.range_b(n).low; }
-    void face(Axis& best, Axis::Kind kind, const dvec3& n) const {
-        if (n == dvec3(0) || !leads_out(n)) return;
-        const double d = depth(n);
-        if (d < best.depth) best = {kind, n, d};
+    // What the surroundings overlap by beyond the triangles.
+    double rise(const Axis& axis, const Surrounded& a, const Surrounded& b, double enough) const {
+        double rise = 0;
+        if (axis.kind != Axis::Kind::face_a) {
+            const bool edge = axis.kind == Axis::Kind::edges;
+            rise = a.rise(edge ? axis.edge_a : highest_corner(pair_.p, axis.normal), axis.normal, enough);
+        }
+        if (axis.kind != Axis::Kind::face_b && rise < enough) {
+            const bool edge = axis.kind == Axis::Kind::edges;
+            rise += b.rise(edge ? axis.edge_b : highest_corner(pair_.q, -axis.normal), -axis.normal, enough - rise);
+        }
+        return rise;
     }
-    void edges(Axis& best, size_t i, size_t j, double sign, double bias) const {
+    double overlap(const dvec3& n) const { return pair_.range_a(n).high - pair_.range_b(n).low; }
+    void face(Axis::Kind kind, const dvec3& n) {
+        if (n == dvec3(0) || !leads_out(n)) return;
+        axes_[count_++] = {kind, n, overlap(n)};
+        least_face_ = std::min(least_face_, axes_[count_ - 1].overlap);
+    }
+    void edges(size_t i, size_t j, double sign) {
         const dvec3 &d = pair_.d[i], &e = pair_.e[j], product = sign * glm::cross(d, e);
         const double length = glm::length(product);
         if (!(length > kParallel * glm::length(d) * glm::length(e))) return;
@@ -75,18 +100,20 @@ private:
         const double high = pair_.range_a(n).high, low = pair_.range_b(n).low;
         // Both edges must lie where the triangles are farthest.
         if (glm::dot(n, pair_.p[i]) < high - touching() || glm::dot(n, pair_.q[j]) > low + touching()) return;
-        if (!(high - low < best.depth - bias)) return;
         // And cross, as seen along the normal.
         const auto [s, t] = closest(d, e, pair_.p[i] - pair_.q[j]);
         const dvec3 between = pair_.p[i] + s * d - (pair_.q[j] + t * e);
         if (glm::length(between - glm::dot(n, between) * n) > kCrossing * size_) return;
-        best = {Axis::Kind::edges, n, high - low, static_cast<Feature>(kFirstEdge + i),
-                static_cast<Feature>(kFirstEdge + j)};
+        const double bias = std::isfinite(least_face_) ? kEdgeBias * std::abs(least_face_) + touching() : 0;
+        axes_[count_++] = {Axis::Kind::edges, n, high - low + bias, static_cast<Feature>(kFirstEdge + i),
+                           static_cast<Feature>(kFirstEdge + j)};
     }
 
     const TrianglePair& pair_;
     const dvec3 out_a_, out_b_; // outward normals of closed meshes; else 0
-    double size_ = 0;
+    double size_ = 0, least_face_ = std::numeric_limits<double>::infinity();
+    Axis axes_[4 + 18];
+    uint32_t count_ = 0;
 };
 
 // A polygon cut out of a triangle. `label`: the edge that leaves the corner, 0 ... 2 of that triangle, 3 ... 5 of the
@@ -180,13 +207,34 @@ private:
 
 } // namespace
 
-TriangleContact contact(const PlacedTriangle& a, bool closed_a, const PlacedTriangle& b, bool closed_b,
-                        double margin) noexcept {
-    const TrianglePair pair(a, b);
-    Axes axes(pair, closed_a, closed_b);
-    const Axis axis = axes.least_overlap();
+double Surrounded::rise(Feature feature, const dvec3& up, double enough) const noexcept {
+    if (hills == nullptr) return 0;
+    const dvec3 there = rotation != nullptr ? up * *rotation : up; // the transpose times it
+    if (feature < kFirstEdge) {
+        const double from = hills->height(corners[feature], there);
+        return hills->climb(corners[feature], there, from + enough).height - from;
+    }
+    const uint32_t first = corners[feature - kFirstEdge], second = corners[(feature - kFirstEdge + 1u) % 3];
+    const double from = hills->height(first, there);
+    return std::max(0.0, hills->climb_from_edge(first, second, there, from + enough).height - from);
+}
+
+Feature Surrounded::highest(const dvec3& up) const noexcept {
+    return highest_corner(triangle.corner, up);
+}
+
+Hills::Place Surrounded::top(const dvec3& up) const noexcept {
+    return hills->climb(corners[highest(up)], rotation != nullptr ? up * *rotation : up,
+                        std::numeric_limits<double>::infinity());
+}
+
+TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin, double limit) noexcept {
+    const TrianglePair pair(a.triangle, b.triangle);
+    Axes axes(pair, a.closed, b.closed);
+    const Axis axis = axes.least_overlap(a, b, limit);
     TriangleContact out{};
-    out.normal = axis.normal;
+    out.normal = axis.normal, out.overlap = axis.overlap;
+    if (axis.kind == Axis::Kind::none && limit < HUGE_VAL) return out;
     Points points(pair, margin + axes.touching(), out);
     if (axis.kind == Axis::Kind::edges) {
         const size_t i = axis.edge_a - kFirstEdge, j = axis.edge_b - kFirstEdge;
@@ -200,11 +248,11 @@ TriangleContact contact(const PlacedTriangle& a, bool closed_a, const PlacedTria
     out.faces = axis.kind != Axis::Kind::edges;
     if (out.count > 0) return out;
     // Beside each other: the closest points, if they are apart.
-    const TriangleDistance nearest = distance(a, b);
+    const TriangleDistance nearest = distance(a.triangle, b.triangle);
     const dvec3 between = nearest.on_b - nearest.on_a;
     const double length = glm::length(between);
     if (!(nearest.lower > 0) || length > margin || !axes.leads_out(between / length)) return out;
-    out.normal = between / length, out.faces = false, out.count = 1;
+    out.normal = between / length, out.overlap = -length, out.faces = false, out.count = 1;
     out.points[0] = {nearest.on_a, nearest.on_b, -length, kFace, kFace};
     return out;
 }

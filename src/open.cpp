@@ -318,8 +318,10 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.component_count_ = load_le<uint32_t>(h + kAtComponentCount);
     for (uint32_t v = 0; v < vertex_count; ++v) {
         const Vec3 p = view.vertex(v);
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            return bad("a vertex is not finite", vertices + size_t{v} * kVertexBytes);
+        for (const float x : {p.x, p.y, p.z})
+            if (!(std::abs(x) <= kLargestCoordinate)) // also a NaN
+                return bad("a vertex is not finite, or beyond the largest coordinate (2^74 m)",
+                           vertices + size_t{v} * kVertexBytes);
     }
     for (uint32_t t = 0; t < triangle_count; ++t)
         for (const uint32_t corner : view.triangle(t))

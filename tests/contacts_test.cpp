@@ -250,6 +250,155 @@ TEST(Contacts, ATriangleOnAnEllipsoid) {
         }
 }
 
+// ---- flat ground ----
+
+// Bodies in flat ground: one manifold, its normal, and the depth of the deepest vertex, whatever the triangles are.
+
+/// The sheet's cells are of different sizes, and split along either diagonal.
+Mesh uneven_sheet(Random& random, uint32_t n, float half) {
+    Mesh mesh = shapes::sheet(2 * half, 2 * half, n);
+    std::vector<float> at(n + 1);
+    for (float& x : at) x = static_cast<float>(random.in(-half, half));
+    at.front() = -half, at.back() = half;
+    std::sort(at.begin(), at.end());
+    for (uint32_t i = 0; i <= n; ++i)
+        for (uint32_t j = 0; j <= n; ++j) mesh.vertices[i * (n + 1) + j] = {at[i], at[j], 0};
+    for (size_t cell = 0; cell < mesh.triangles.size(); cell += 2) {
+        const uint32_t a = mesh.triangles[cell][0], b = mesh.triangles[cell][1], c = mesh.triangles[cell][2],
+                       d = mesh.triangles[cell + 1][2];
+        if (random.below(2) == 0) mesh.triangles[cell] = {a, b, d}, mesh.triangles[cell + 1] = {b, c, d};
+    }
+    return mesh;
+}
+/// Closed, with this top.
+Mesh slab_below(const Mesh& top, uint32_t n, float thickness) {
+    Mesh mesh = top;
+    const auto count = static_cast<uint32_t>(top.vertices.size());
+    for (const Vec3& v : top.vertices) mesh.vertices.push_back({v.x, v.y, v.z - thickness});
+    for (const Triangle& t : top.triangles) mesh.triangles.push_back({t[0] + count, t[2] + count, t[1] + count});
+    const auto wall = [&](uint32_t a, uint32_t b) { // from a to b, counter-clockwise around the top
+        mesh.triangles.push_back({b, a, a + count});
+        mesh.triangles.push_back({b, a + count, b + count});
+    };
+    for (uint32_t i = 0; i < n; ++i) {
+        const uint32_t row = n + 1;
+        wall(i * row, (i + 1) * row), wall(n * row + i, n * row + i + 1);
+        wall((i + 1) * row + n, i * row + n), wall(i + 1, i);
+    }
+    return mesh;
+}
+/// As the pose places it; rounded, so that what was flat is so but for that.
+Mesh turned(Mesh mesh, const Quat& rotation) {
+    for (Vec3& v : mesh.vertices) v = scenes::to_float(scenes::rotate(rotation, {v.x, v.y, v.z}));
+    return mesh;
+}
+/// Every vertex of the unit sphere pushed apart along z, or scaled.
+Mesh stretched(Mesh mesh, float x, float y, float z, float apart = 0) {
+    for (Vec3& v : mesh.vertices) v = {x * v.x, y * v.y, z * v.z + (v.z > 0 ? apart : -apart)};
+    return mesh;
+}
+/// A prism of n sides with fans for its ends.
+Mesh prism(uint32_t n, float radius, float half) {
+    Mesh mesh{{{0, 0, -half}, {0, 0, half}}, {}};
+    for (uint32_t i = 0; i < n; ++i) {
+        const float u = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / static_cast<float>(n);
+        for (const float z : {-half, half}) mesh.vertices.push_back({radius * std::cos(u), radius * std::sin(u), z});
+        const uint32_t a = 2 + 2 * i, b = 2 + 2 * ((i + 1) % n);
+        mesh.triangles.insert(mesh.triangles.end(), {{0, b, a}, {1, a + 1, b + 1}, {a, b, b + 1}, {a, b + 1, a + 1}});
+    }
+    return mesh;
+}
+struct Convex {
+    const char* name;
+    Mesh mesh;
+    Solid solid;
+};
+std::vector<Convex> convex_bodies() {
+    std::vector<Convex> out;
+    const auto add = [&](const char* name, const Mesh& mesh) { out.push_back({name, mesh, exact(mesh)}); };
+    add("cube", shapes::moved(shapes::box(), {-0.5f, -0.5f, -0.5f}));
+    add("plank", shapes::moved(shapes::box(1, 0.5f, 0.25f), {-0.5f, -0.25f, -0.125f}));
+    add("fine ball", shapes::moved(shapes::icosphere(4), {}, 0.5f));
+    add("coarse ball", shapes::moved(shapes::icosphere(1), {}, 0.5f));
+    add("tetrahedron", shapes::moved(shapes::tetrahedron(), {-0.25f, -0.25f, -0.25f}));
+    add("capsule", stretched(shapes::icosphere(3), 0.2f, 0.2f, 0.2f, 0.3f));
+    add("ellipsoid", stretched(shapes::icosphere(3), 0.6f, 0.3f, 0.2f));
+    add("cylinder", prism(32, 0.3f, 0.4f));
+    return out;
+}
+struct Ground {
+    const char* name;
+    Solid solid;
+    Quat rotation; ///< of its normal, from (0, 0, 1)
+};
+std::vector<Ground> grounds() {
+    constexpr float kHalf = 2;
+    constexpr uint32_t kCells = 16; // of 0.25
+    std::vector<Ground> out;
+    Random random(21);
+    const Mesh cells = shapes::moved(shapes::sheet(2 * kHalf, 2 * kHalf, kCells), {-kHalf, -kHalf, 0}),
+               square = shapes::moved(shapes::sheet(2 * kHalf, 2 * kHalf, 1), {-kHalf, -kHalf, 0}),
+               uneven = uneven_sheet(random, kCells, kHalf);
+    const Quat tilted = random.rotation(), other = random.rotation();
+    out.push_back({"floor of cells", exact(cells, false), {}});
+    out.push_back({"slab of cells", exact(slab_below(cells, kCells, 1)), {}});
+    out.push_back({"square of two triangles", exact(square, false), {}});
+    out.push_back({"box", exact(slab_below(square, 1, 1)), {}});
+    out.push_back({"tilted floor", exact(turned(uneven, tilted), false), tilted});
+    out.push_back({"tilted slab", exact(turned(slab_below(uneven, kCells, 1), other)), other});
+    return out;
+}
+
+double lowest_along(const Mesh& mesh, const Quat& rotation, const Point& up) {
+    double low = HUGE_VAL;
+    for (const Vec3& v : mesh.vertices) {
+        const Point p = scenes::rotate(rotation, {v.x, v.y, v.z});
+        low = std::min(low, p[0] * up[0] + p[1] * up[1] + p[2] * up[2]);
+    }
+    return low;
+}
+double deepest_of(const ContactManifolds& m) {
+    double out = -HUGE_VAL;
+    for (uint32_t i = 0; i < m.count; ++i)
+        for (uint32_t k = 0; k < m.manifolds[i].count; ++k) out = std::max(out, double{m.manifolds[i].points[k].depth});
+    return out;
+}
+
+TEST(Contacts, FlatGroundHasOneNormalAndTheDepthOfTheDeepestVertex) {
+    const auto bodies = convex_bodies();
+    Random random(22);
+    for (const Ground& ground : grounds()) {
+        const Point up = scenes::rotate(ground.rotation, {0, 0, 1});
+        for (const Convex& body : bodies)
+            for (const double depth : {0.001, 0.01, 0.03, 0.1}) {
+                int ghosts = 0;
+                double worst = 0;
+                for (int i = 0; i < 25; ++i) {
+                    Pose pose{{}, random.rotation()};
+                    const double height = -lowest_along(body.mesh, pose.rotation, up) - depth;
+                    pose.translation = scenes::to_float(
+                        scenes::rotate(ground.rotation, {random.in(-0.5, 0.5), random.in(-0.5, 0.5), height}));
+                    const ContactManifolds m = fresh(ground.solid, {}, body.solid, pose);
+                    bool ghost = m.count != 1;
+                    for (uint32_t k = 0; k < m.count; ++k)
+                        ghost = ghost || dot(m.manifolds[k].normal, scenes::to_float(up)) < 1 - 1e-6;
+                    ghosts += ghost;
+                    worst = std::max(worst, std::abs(deepest_of(m) - depth));
+                }
+                EXPECT_EQ(ghosts, 0) << ground.name << ", " << body.name << ", " << depth;
+                EXPECT_LT(worst, 1e-6 + 0.01 * depth) << ground.name << ", " << body.name << ", " << depth;
+            }
+    }
+}
+
+TEST(Contacts, ACubeOnItsCorner) {
+    const Solid floor = exact(shapes::moved(shapes::sheet(2, 2, 1), {-1, -1, 0}), false), cube = unit_box();
+    const ContactManifolds m = fresh(floor, {}, cube, {{-0.3466f, 0.3485f, 0.7101f}, {-0.1f, 0, -0.4f, -0.4f}});
+    ASSERT_EQ(m.count, 1u);
+    EXPECT_NEAR(m.manifolds[0].normal.z, 1, 1e-6);
+    EXPECT_NEAR(deepest_of(m), 0.00202, 1e-5);
+}
+
 // ---- time ----
 
 std::vector<uint64_t> ids_of(const ContactManifolds& m) {

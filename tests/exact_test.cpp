@@ -12,7 +12,11 @@
 #include <prolate/bounds.hpp>
 #include <prolate/build.hpp>
 #include <prolate/collide.hpp>
+#include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
+#include <prolate/raycast.hpp>
+#include <prolate/shapes.hpp>
+#include <prolate/sweep.hpp>
 #include <prolate/verify.hpp>
 
 #include <gtest/gtest.h>
@@ -203,6 +207,61 @@ TEST(ExactTree, EndsWhereTheFormatDoes) {
     BuildOptions options;
     options.degree = 2, options.leaf_triangles = 1;
     EXPECT_EQ(must_build(spiral(), options).tree.view().level_count(), kMaxLevels); // then parts are halved
+}
+
+TEST(ExactTree, CoordinatesHaveALimit) {
+    // At the limit everything is finite; beyond it, nothing is baked and nothing opened.
+    const auto sized = [](float half) { return shapes::moved(shapes::box(2, 2, 2), {-half, -half, -half}, half); };
+    const Mesh largest = sized(kLargestCoordinate);
+    const auto beyond = build(sized(kLargestCoordinate * 1.001f).view(), {.exact = true});
+    ASSERT_FALSE(beyond);
+    EXPECT_EQ(beyond.error().code, ErrorCode::bad_mesh);
+    EXPECT_EQ(std::string(beyond.error().what).substr(0, 6), "vertex");
+
+    const Build built = must_build(largest);
+    const TreeView tree = built.tree.view();
+    std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
+    const auto at = static_cast<size_t>(tree.vertex_bytes() - tree.bytes().data()) + 12 * 5;
+    for (const float bad : {3e38f, -kLargestCoordinate * 1.001f, std::numeric_limits<float>::infinity(),
+                            std::numeric_limits<float>::quiet_NaN()}) {
+        store_le(bytes.data() + at + 4, bad);
+        const auto opened = TreeView::open(bytes, {.check_hash = false});
+        ASSERT_FALSE(opened);
+        EXPECT_EQ(opened.error().where, at);
+    }
+
+    const Build ball = must_build(shapes::moved(shapes::icosphere(2), {}, kLargestCoordinate));
+    scenes::Random random(14);
+    QueryContext context;
+    for (const TreeView& other : {tree, ball.tree.view()})
+        for (int i = 0; i < 50; ++i) {
+            const Point d = random.direction();
+            const double t = double{kLargestCoordinate} * random.in(0, 4);
+            const Pose pose{scenes::to_float({t * d[0], t * d[1], t * d[2]}), random.rotation()};
+            const auto finite = [](const Vec3& v) {
+                return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+            };
+            const QueryOptions near{.margin = 0.1f * kLargestCoordinate};
+            ContactManifolds m;
+            const ContactResult touching = contacts(tree, {}, other, pose, m, context, near);
+            EXPECT_EQ(touching.verdict, collide(tree, {}, other, pose, context, near).verdict);
+            EXPECT_EQ(m.count > 0, touching.verdict == Verdict::overlapping && !touching.enclosed);
+            for (uint32_t k = 0; k < m.count; ++k)
+                for (uint32_t p = 0; p < m.manifolds[k].count; ++p) {
+                    const ContactPoint& point = m.manifolds[k].points[p];
+                    EXPECT_TRUE(finite(m.manifolds[k].normal) && finite(point.point_a) && finite(point.point_b) &&
+                                std::isfinite(point.depth));
+                }
+            const DistanceResult apart = distance(tree, {}, other, pose, context);
+            EXPECT_TRUE(std::isfinite(apart.lower) && std::isfinite(apart.upper));
+            const float far = 3 * kLargestCoordinate;
+            const SweepResult swept = sweep(tree, {}, other, {pose, {far, -far, far}, {1, 2, 3}, {}}, context);
+            EXPECT_NE(swept.verdict, Verdict::undecided);
+            EXPECT_TRUE(std::isfinite(swept.distance) && finite(swept.point_a) && finite(swept.normal));
+            const RaycastResult hit = raycast(other, pose, {{}, scenes::to_float(random.direction())}, context);
+            EXPECT_EQ(std::isfinite(hit.t) && finite(hit.point), hit.verdict == Verdict::overlapping);
+            EXPECT_NE(overlap(other, pose, Sphere{{}, kLargestCoordinate}, context).verdict, Verdict::undecided);
+        }
 }
 
 TEST(ExactTree, OptionsAreChecked) {
@@ -775,11 +834,11 @@ TEST(ExactQuery, ABudgetIsExactAndDeeperNeverRevokesSeparated) {
             for (int i = 0; i < 4; ++i) {
                 const Query q = at(between(random), random.in(0.5, 1));
                 const CollideResult full = ask(a.built, b.built, q);
-                const uint64_t need = full.stats.pair_tests;
+                const uint64_t need = full.stats.tests();
                 for (uint64_t budget = 0; budget <= need + 1; budget += 1 + budget / 4) {
                     const CollideResult result = ask(a.built, b.built, q, {.max_pair_tests = budget});
                     ASSERT_EQ(result.verdict, budget < need ? Verdict::undecided : full.verdict);
-                    ASSERT_LE(result.stats.pair_tests, std::min(budget, need));
+                    ASSERT_LE(result.stats.tests(), std::min(budget, need));
                 }
                 Verdict before = Verdict::overlapping;
                 for (uint32_t level = 0; level < 6; ++level) {

@@ -145,13 +145,13 @@ TEST(Inside, StopsWithinTheBudget) {
     QueryStats all;
     ASSERT_EQ(query::winding_number(tree, at({0.01, 0.02, 0.03}), all, UINT64_MAX), 1);
     ASSERT_GT(all.pair_tests, 30u);
-    for (uint64_t most = 0; most < all.pair_tests; ++most) {
+    for (uint64_t most = 0; most < all.tests(); ++most) {
         QueryStats stats;
         EXPECT_FALSE(query::winding_number(tree, at({0.01, 0.02, 0.03}), stats, most));
-        EXPECT_LE(stats.pair_tests, most);
+        EXPECT_LE(stats.tests(), most);
     }
     QueryStats stats;
-    EXPECT_EQ(query::winding_number(tree, at({0.01, 0.02, 0.03}), stats, all.pair_tests), 1);
+    EXPECT_EQ(query::winding_number(tree, at({0.01, 0.02, 0.03}), stats, all.tests()), 1);
 }
 
 TEST(Inside, NodesThatDoNotEncloseAreNoticed) {

@@ -542,7 +542,7 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
                 options.max_pair_tests = most;
                 const RaycastResult some = cast(tree, pose, ray, options);
                 ASSERT_NE(some.verdict, Verdict::separated);
-                ASSERT_LE(some.stats.pair_tests, most);
+                ASSERT_LE(some.stats.tests(), most);
                 ASSERT_LE(some.clear, result.t * (1 + 1e-6));
                 ASSERT_GE(some.t, result.t);
                 budgets += some.verdict == Verdict::undecided && some.clear > 0;

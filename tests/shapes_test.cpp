@@ -408,7 +408,7 @@ TEST(Shapes, ExactTreesAnswerAsAllTheirTrianglesDo) {
             for (const uint64_t most : {0, 1, 9, 17}) {
                 options.max_pair_tests = most;
                 const OverlapResult some = s.ask(tree, pose, options);
-                ASSERT_LE(some.stats.pair_tests, most);
+                ASSERT_LE(some.stats.tests(), most);
                 ASSERT_TRUE(some.verdict == Verdict::undecided || some.verdict == result.verdict);
                 undecided += some.verdict == Verdict::undecided;
             }

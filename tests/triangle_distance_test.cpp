@@ -145,7 +145,7 @@ TEST_P(ContactFamily, PointsLieOnBothTrianglesAndTheNormalTakesThemApart) {
         const auto [a, b] = placed(p);
         if (query::apart(a, b)) continue;
         ++meeting;
-        const auto c = query::contact(a, false, b, false, 0);
+        const auto c = query::contact({a}, {b}, 0);
         const double s = size(p);
         ASSERT_NEAR(glm::length(c.normal), 1, 1e-12);
         ASSERT_GT(c.count, 0u) << i;
@@ -175,18 +175,18 @@ INSTANTIATE_TEST_SUITE_P(All, ContactFamily, testing::ValuesIn(kFamilies),
 TEST(TriangleContact, OfSimpleOnes) {
     const Corners floor{{{-8, -8, 0}, {8, -8, 0}, {0, 8, 0}}};
     const Corners spike{{{0, 0, -0.25f}, {1, 0, 4}, {-1, 0, 4}}}; // through it
-    const auto through = query::contact(triangle(floor), false, triangle(spike), false, 0);
+    const auto through = query::contact({triangle(floor)}, {triangle(spike)}, 0);
     ASSERT_EQ(through.count, 1u);
     EXPECT_NEAR(through.points[0].depth, 0.25, 1e-12);
     EXPECT_NEAR(through.normal.z, 1, 1e-12);
     EXPECT_NEAR(glm::length(through.points[0].on_a), 0, 1e-12);
-    const auto reverse = query::contact(triangle(spike), false, triangle(floor), false, 0);
+    const auto reverse = query::contact({triangle(spike)}, {triangle(floor)}, 0);
     ASSERT_EQ(reverse.count, 1u);
     EXPECT_NEAR(reverse.points[0].depth, 0.25, 1e-12);
     EXPECT_NEAR(reverse.normal.z, -1, 1e-12);
 
     const Corners left{{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}}, right{{{2, 0, 0}, {6, 0, 0}, {2, 4, 0}}};
-    const auto flat = query::contact(triangle(left), false, triangle(right), false, 0); // (2,0) (4,0) (2,2)
+    const auto flat = query::contact({triangle(left)}, {triangle(right)}, 0); // (2,0) (4,0) (2,2)
     ASSERT_EQ(flat.count, 3u);
     glm::dvec3 sum(0);
     for (uint32_t k = 0; k < 3; ++k) {

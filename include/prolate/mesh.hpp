@@ -47,7 +47,8 @@ struct CleanMesh {
 
 /// Merges vertices of equal position, drops redundant triangles and unused vertices, and classifies the edges. What
 /// stays keeps its order. Fails with bad_mesh for no triangle with an area, an index out of range, or a coordinate that
-/// is not finite (`what` begins with "triangle" or "vertex", and `where` is its index). O(n log n). Thread-safe.
+/// is not finite or beyond kLargestCoordinate (`what` begins with "triangle" or "vertex", and `where` is its index).
+/// O(n log n). Thread-safe.
 Result<CleanMesh> clean(MeshView mesh);
 
 /// XXH3-64 of vertices and triangles in their order. Of a cleaned mesh, it is what BakeInfo::source_hash holds.

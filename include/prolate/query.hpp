@@ -37,7 +37,7 @@ struct QueryOptions {
     /// so deeper never contradicts shallower: a shallow *separated* holds at every depth. Ellipsoids of exact trees
     /// cover surfaces; short of the leaves nothing is said of what they enclose, nor is it by a prefix of such a tree.
     uint32_t max_level = kMaxLevels;
-    /// Stop before this many tests of nodes would be exceeded: QueryStats::pair_tests.
+    /// Stop before this many tests, of nodes and of triangles together, would be exceeded: QueryStats::tests().
     uint64_t max_pair_tests = UINT64_MAX;
     /// Inflate the bodies by this distance together, metres, >= 0: bodies not farther apart than this count as meeting.
     float margin = 0;
@@ -49,6 +49,8 @@ struct QueryStats {
     uint64_t block_tests = 0;    ///< blocks of up to eight siblings that were tested at once: the unit of time
     uint64_t triangle_tests = 0; ///< triangles tested against triangles, leaf ellipsoids, shapes or rays
     uint32_t deepest_level = 0;  ///< deepest level that a tested node came from
+
+    uint64_t tests() const noexcept { return pair_tests + triangle_tests; } ///< what a budget is spent on
 };
 
 inline constexpr uint32_t kNoTriangle = UINT32_MAX;

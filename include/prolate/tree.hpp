@@ -32,6 +32,12 @@ inline constexpr uint32_t kBlockLanes = 8; ///< nodes that a block has room for
 inline constexpr size_t kBlockBytes = 256; ///< bytes of one block in the file
 inline constexpr size_t kHullBytes = 64;   ///< bytes of one hull record in the file
 
+/// Absolute value of a vertex' coordinate, metres, at most: build(), verify() and open() refuse meshes beyond it. Two
+/// things set it. The coarsest lattice, of 2^16 steps of 2^60 m, holds the centers of nodes; and queries multiply up to
+/// twelve lengths (a triple product's factor of edges and normals, squared), none of which exceeds the diameter 2^76,
+/// so that all stays below 2^912, within a double.
+inline constexpr float kLargestCoordinate = 0x1p74f; // 1.9e22
+
 /// Triangles in a leaf of an exact tree, at most.
 inline constexpr uint32_t kMaxLeafTriangles = 127;
 

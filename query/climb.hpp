@@ -1,0 +1,46 @@
+// How far does a mesh reach in a direction, near one of its triangles? Hill climbing from vertex to vertex (Cameron,
+// "Enhancing GJK", 1997): of a convex body it ends at the farthest vertex, of any other one at the top of a hill.
+//
+// Neighbours are found by the vertices' indices: triangles hang together where they share a vertex. A vertex's
+// triangles lie in leaves whose boxes hold it, a few of them.
+//
+// Complexity: a step is a descent to the leaves around one vertex, about ten blocks; kClimbSteps at most.
+#pragma once
+
+#include <prolate/tree.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+
+namespace prolate::query {
+
+inline constexpr uint32_t kClimbSteps = 128;
+
+/// A tree with triangles, in its own frame.
+class Hills {
+public:
+    struct Place {
+        uint32_t vertex;
+        double height; ///< along the direction
+    };
+    /// `tests` counts nodes and triangles looked at; it climbs no further once they exceed `most_tests`.
+    Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests) noexcept
+        : tree_(tree), tests_(tests), most_tests_(most_tests) {}
+
+    /// Climbs along `up` from a vertex; no further than to a height above `enough`.
+    Place climb(uint32_t vertex, const glm::dvec3& up, double enough) const noexcept;
+    /// From an edge on, all of which is equally high: the edge itself, if its triangles do not rise from it.
+    Place climb_from_edge(uint32_t first, uint32_t second, const glm::dvec3& up, double enough) const noexcept;
+
+    double height(uint32_t vertex, const glm::dvec3& up) const noexcept;
+
+private:
+    template <class Visit> void triangles_at(uint32_t vertex, Visit&& visit) const;
+
+    const TreeView& tree_;
+    uint64_t& tests_;
+    const uint64_t most_tests_;
+};
+
+} // namespace prolate::query
