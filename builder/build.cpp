@@ -7,11 +7,11 @@
 #include "builder/grow.hpp"
 #include "builder/hausdorff.hpp"
 #include "builder/hulls.hpp"
+#include "builder/job.hpp"
 
 #include "src/format.hpp"
 
 #include <Eigen/Geometry>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -42,6 +42,10 @@ constexpr double kSmallestRadius = 1e-5;  // of the diagonal
 constexpr double kDistanceTolerance[] = {1e-3, 1e-4, 1e-4};  // of the largest one, in diagonals
 constexpr uint32_t kDistanceSamples[] = {2000, 8000, 32000}; // for mean and percentile
 
+// Meshes that the format can hold with all their nodes: a leaf of kSmallestRadius needs an exponent, and the lattice
+// reaches across. Metres, of the box's diagonal.
+constexpr double kSmallestMesh = 1e-24, kLargestMesh = 1e22;
+
 // A solid of less than this share of its diagonal's cube has no inside worth the name.
 constexpr double kNoInside = 1e-12;
 // Volume that may lie in several overlapping parts of a mesh, for the analytic method: share of the solid.
@@ -51,8 +55,14 @@ constexpr double kMostOverlap = 1e-3;
 class Bake {
 public:
     Bake(const BuildOptions& options, const ProgressCallback& progress)
-        : options_(options), effort_(effort_of(options.quality)), progress_(progress) {}
+        : options_(options), effort_(effort_of(options.quality)), progress_(progress),
+          job_(options.threads, progress ? [this] { return go_on(); } : std::function<bool()>()) {}
 
+    Result<Build> operator()(MeshView mesh) {
+        return job_.run([&] { return run(mesh); });
+    }
+
+private:
     Result<Build> run(MeshView input) {
         const auto start = Clock::now();
         auto cleaned = clean(input);
@@ -60,12 +70,16 @@ public:
         mesh_ = cleaned->mesh.view();
         closed_ = cleaned->report.closed;
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
+        if (box_.size().norm() < kSmallestMesh)
+            return Error{ErrorCode::bad_mesh, "the mesh is less than 1e-24 m across; give it in another unit", 0};
+        if (box_.size().norm() > kLargestMesh)
+            return Error{ErrorCode::bad_mesh, "the mesh is more than 1e22 m across; give it in another unit", 0};
         if (options_.exact) return run_exact(cleaned->report, start);
-        if (!report("voxelise", 0, 0)) return stopped();
+        report("voxelise", 0, 0);
 
         const Winding winding(mesh_);
         Pieces pieces = cut_pieces(winding);
-        if (!report("voxelise", 0.04, 0)) return stopped();
+        report("voxelise", 0.04, 0);
         const Columns columns = measure_solid(winding);
         if (options_.tolerance > 0 && solid_.value == 0)
             return Error{ErrorCode::bad_mesh,
@@ -80,10 +94,9 @@ public:
                              "the analytic method needs a closed mesh whose parts do not overlap; use the voxel method",
                              0};
         }
-        if (!report("fit", 0.05, 1)) return stopped();
+        report("fit", 0.05, 1);
 
         const Grown grown = grow_tree(pieces, winding);
-        if (cancelled_) return stopped();
 
         std::vector<format::PackedLevel> levels;
         if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
@@ -94,7 +107,6 @@ public:
             auto draft = Tree::open(format::encode(info, options_.degree, lattice_, levels));
             if (!draft) return draft.error();
             figures = measure(draft->view(), grown, columns, winding, levels);
-            if (cancelled_) return stopped();
         }
         auto tree = Tree::open(format::encode(info, options_.degree, lattice_, levels));
         if (!tree) return tree.error();
@@ -104,18 +116,17 @@ public:
                      box_.size().norm(), resolution_,     !closed_,           grown.goal_reached, seconds_since(start)};
     }
 
-private:
     Result<Build> run_exact(const MeshReport& mesh_report, Clock::time_point start) {
-        if (!report("measure", 0, 0)) return stopped();
-        measure_solid(Winding(mesh_));
-        if (!report("split", 0.1, 1)) return stopped();
+        report("measure", 0, 0);
+        if (closed_) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
+        report("split", 0.1, 1);
         ExactOptions options{options_.degree, options_.leaf_triangles, kSmallestRadius * box_.size().norm(), {}};
-        if (progress_) options.progress = [this](double done) { return report("split", 0.1 + 0.75 * done, 0); };
+        options.progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); };
         const auto grown = grow_exact(mesh_, options);
         if (!grown) return grown.error();
         std::vector<std::byte> bytes =
             format::encode(describe(true), options_.degree, grown->lattice, grown->levels, grown->packed());
-        if (!report("hulls", 0.85, 0)) return stopped();
+        report("hulls", 0.85, 0);
         const auto without_hulls = TreeView::open(bytes, {.check_hash = false}); // Tree::open() checks the whole
         if (!without_hulls) return without_hulls.error();
         format::store_hulls(bytes, hulls_of(*without_hulls));
@@ -140,14 +151,22 @@ private:
         return columns;
     }
 
-    bool report(const char* stage, double fraction, uint32_t nodes) {
-        if (!progress_) return true;
-        const std::lock_guard lock(reporting_);
-        fraction_ = std::max(fraction_, fraction);
-        if (!progress_({stage, fraction_, nodes})) cancelled_ = true;
-        return !cancelled_;
+    // Tells the caller, and asks whether to go on; throws Cancelled if not.
+    void report(const char* stage, double fraction, uint32_t nodes) {
+        {
+            const std::lock_guard lock(reporting_);
+            reached_ = {stage, std::max(reached_.fraction, fraction), nodes};
+        }
+        job_.ask();
     }
-    static Error stopped() { return {ErrorCode::cancelled, "cancelled", 0}; }
+    bool go_on() {
+        BuildProgress reached;
+        {
+            const std::lock_guard lock(reporting_);
+            reached = reached_;
+        }
+        return progress_(reached);
+    }
 
     double surface_area() const {
         double area = 0;
@@ -174,10 +193,9 @@ private:
     Pieces cut_pieces(const Winding& winding) {
         resolution_ = effort_.resolution;
         for (;;) {
-            const bool go_on = report("voxelise", 0.01, 0);
+            report("voxelise", 0.01, 0);
             Pieces pieces(mesh_, closed_, winding, resolution_);
-            if (pieces.size() >= kPiecesPerLeaf * expected_leaves() || resolution_ == kMaxResolution || !go_on)
-                return pieces;
+            if (pieces.size() >= kPiecesPerLeaf * expected_leaves() || resolution_ == kMaxResolution) return pieces;
             resolution_ = finer(resolution_, kPiecesPerLeaf * expected_leaves() / pieces.size());
         }
     }
@@ -283,7 +301,7 @@ private:
                                      const Winding& winding, std::vector<format::PackedLevel>& levels) {
         std::vector<LevelReport> figures;
         for (uint32_t l = 0; l < tree.level_count(); ++l) {
-            if (!report("measure", 0.8 + 0.05 * l / tree.level_count(), tree.node_count())) return {};
+            report("measure", 0.8 + 0.05 * l / tree.level_count(), tree.node_count());
             const auto start = Clock::now();
             std::vector<Ellipsoid> cut;
             tree.for_each_in_cut(l, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
@@ -318,7 +336,10 @@ private:
         VerifyOptions options;
         options.threads = options_.threads;
         if (progress_)
-            options.progress = [&](double done) { return report("prove", 0.85 + 0.15 * done, tree.node_count()); };
+            options.progress = [&](double done) {
+                report("prove", 0.85 + 0.15 * done, tree.node_count());
+                return true;
+            };
         const auto start = Clock::now();
         const auto proof = verify(tree, mesh_, options);
         if (!proof) return proof.error();
@@ -338,9 +359,10 @@ private:
     const BuildOptions& options_;
     const Effort effort_;
     const ProgressCallback& progress_;
+    Job job_;
     std::mutex reporting_;
-    std::atomic<bool> cancelled_ = false;
-    double fraction_ = 0;
+    BuildProgress reached_{"clean", 0, 0};
+    std::atomic<bool> cancelled_ = false; // stays so: Cancelled ends all work
 
     MeshView mesh_;
     bool closed_ = false;
@@ -357,8 +379,9 @@ private:
 Result<Build> build(MeshView mesh, const BuildOptions& options, const ProgressCallback& progress) {
     if (const auto valid = validate(options); !valid) return valid.error();
     try {
-        tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
-        return arena.execute([&] { return Bake(options, progress).run(mesh); });
+        return Bake(options, progress)(mesh);
+    } catch (const Cancelled&) {
+        return Error{ErrorCode::cancelled, "cancelled", 0};
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::bad_mesh, "not enough memory; lower the quality, the count or the mesh's size", 0};
     }

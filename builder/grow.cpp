@@ -1,8 +1,7 @@
 #include "builder/grow.hpp"
 
+#include "builder/job.hpp"
 #include "builder/random.hpp"
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <chrono>
@@ -162,7 +161,7 @@ private:
         const uint32_t pieces_per_cluster =
             kPiecesPerCluster[static_cast<size_t>(start) / 2 % std::size(kPiecesPerCluster)];
         std::vector<std::vector<Cluster>> clusters(task.cells.size());
-        tbb::parallel_for(size_t{0}, task.cells.size(), [&](size_t p) {
+        parallel_for(size_t{0}, task.cells.size(), [&](size_t p) {
             if (merging)
                 clusters[p] = merge_start(solid_.cells, task.cells[p], task.children, pieces_per_cluster,
                                           options_.min_radius, outside_volume_);
@@ -502,8 +501,8 @@ private:
         grown_.nodes[0].pieces.clear();
         for (uint32_t level = 1; !groups.empty(); ++level) {
             std::vector<std::vector<std::vector<uint32_t>>> parts(groups.size());
-            tbb::parallel_for(size_t{0}, groups.size(),
-                              [&](size_t g) { parts[g] = parts_of(groups[g].members, fits, sketches, touching); });
+            parallel_for(size_t{0}, groups.size(),
+                         [&](size_t g) { parts[g] = parts_of(groups[g].members, fits, sketches, touching); });
             std::vector<Group> next;
             for (size_t g = 0; g < groups.size(); ++g) {
                 const uint32_t parent = groups[g].node;

@@ -1,10 +1,8 @@
 #include "builder/polish.hpp"
 
 #include "builder/cover.hpp"
+#include "builder/job.hpp"
 #include "builder/random.hpp"
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -141,18 +139,16 @@ private:
     // be moved at the same time.
     void find_candidates() {
         neighbours_ = neighbours_of(fits_, kMargin);
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, fits_.size(), 1), [&](const auto& range) {
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const Box box = box_of(fits_[i], kMargin);
-                candidates_[i].clear();
-                pieces_.for_each_near(box, [&](uint32_t piece) {
-                    const Vec& c = pieces_.center(piece);
-                    const double r = pieces_.radius(piece);
-                    if (((c - box.low).array() < -r).any() || ((box.high - c).array() < -r).any()) return;
-                    if (chain_holds(set_, i, pieces_, piece)) candidates_[i].push_back(piece);
-                });
-                find_held(i);
-            }
+        parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
+            const Box box = box_of(fits_[i], kMargin);
+            candidates_[i].clear();
+            pieces_.for_each_near(box, [&](uint32_t piece) {
+                const Vec& c = pieces_.center(piece);
+                const double r = pieces_.radius(piece);
+                if (((c - box.low).array() < -r).any() || ((box.high - c).array() < -r).any()) return;
+                if (chain_holds(set_, i, pieces_, piece)) candidates_[i].push_back(piece);
+            });
+            find_held(i);
         });
         count_holders();
 
@@ -232,16 +228,12 @@ private:
 
     void update(const std::vector<uint32_t>& group) {
         std::vector<Fit> next(group.size());
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, group.size(), 1), [&](const auto& range) {
-            for (size_t n = range.begin(); n != range.end(); ++n) next[n] = improved(group[n]);
-        });
+        parallel_for(size_t{0}, group.size(), [&](size_t n) { next[n] = improved(group[n]); });
         for (size_t n = 0; n < group.size(); ++n) {
             count(group[n], -1);
             fits_[group[n]] = next[n];
         }
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, group.size(), 1), [&](const auto& range) {
-            for (size_t n = range.begin(); n != range.end(); ++n) find_held(group[n]);
-        });
+        parallel_for(size_t{0}, group.size(), [&](size_t n) { find_held(group[n]); });
         for (const uint32_t i : group) count(i, +1);
     }
 
@@ -347,16 +339,14 @@ void refine_seams(Pieces& pieces, const EllipsoidSet& set) {
         const uint32_t count = pieces.size();
         std::vector<std::vector<uint32_t>> held(set.fits.size());
         const size_t known = settled.size();
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, set.fits.size(), 1), [&](const auto& range) {
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const Fit large = set.fits[i].scaled(kNearlyHeld);
-                const double shortest_inverse = large.inverse.norm();
-                pieces.for_each_near(box_of(large, 1), [&](uint32_t piece) {
-                    if (piece < known && settled[piece]) return;
-                    if (holds(large, shortest_inverse, pieces, piece) && chain_holds(set, i, pieces, piece))
-                        held[i].push_back(piece);
-                });
-            }
+        parallel_for(size_t{0}, set.fits.size(), [&](size_t i) {
+            const Fit large = set.fits[i].scaled(kNearlyHeld);
+            const double shortest_inverse = large.inverse.norm();
+            pieces.for_each_near(box_of(large, 1), [&](uint32_t piece) {
+                if (piece < known && settled[piece]) return;
+                if (holds(large, shortest_inverse, pieces, piece) && chain_holds(set, i, pieces, piece))
+                    held[i].push_back(piece);
+            });
         });
         settled.resize(count, false);
         for (const std::vector<uint32_t>& list : held)

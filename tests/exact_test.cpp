@@ -199,7 +199,7 @@ TEST(ExactTree, LeavesHoldSeveralTrianglesWhereThatIsCheaper) {
     // So many full nodes of 8 would lead down to single triangles.
     EXPECT_LT(inner, (built.tree.view().triangle_count() - 1) / 7);
     // The squares of other scales' widths are beyond a float: still the same tree, up to rounding.
-    for (const float scale : {1e-25f, 1e20f})
+    for (const float scale : {1e-24f, 1e20f})
         EXPECT_NEAR(inner_nodes(must_build(torus(scale)).tree.view()), inner, 0.02 * inner) << scale;
 }
 

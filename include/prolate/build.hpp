@@ -48,7 +48,8 @@ struct BuildProgress {
     uint32_t nodes = 0;     ///< nodes made so far
 };
 
-/// Called now and then from one thread at a time; return false to cancel the build.
+/// Called from one thread at a time when something is done, and at least some times a second; return false to cancel
+/// the build, which then ends within a second.
 using ProgressCallback = std::function<bool(const BuildProgress&)>;
 
 /// Figures of one level's cut.
@@ -64,7 +65,7 @@ struct Build {
     Tree tree;
     MeshReport mesh;
     std::vector<LevelReport> levels;
-    double solid_volume = 0;       ///< cubic metres
+    double solid_volume = 0;       ///< cubic metres; 0 where there is no inside, and of exact trees of open meshes
     double solid_volume_error = 0; ///< cubic metres; found as LevelFigures::outside_ratio_error is
     double diagonal = 0;           ///< of the mesh's bounding box, metres
     uint32_t resolution = 0;       ///< voxels along the longest side
@@ -75,7 +76,8 @@ struct Build {
 
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
-/// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
+/// triangles is guaranteed, its inside only as far as the generalized winding number tells one. Meshes of less than
+/// 1e-24 or more than 1e22 m across are refused.
 /// Fails with bad_options, unsupported, bad_mesh, cancelled, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 

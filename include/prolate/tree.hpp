@@ -56,7 +56,7 @@ struct BakeInfo {
     bool exact = false;        ///< an exact tree: only the triangles are covered, and stored beside the nodes
     bool proved = false;       ///< the cover of every level was proved, after quantisation, before the file was written
     bool goal_reached = true;  ///< false: the asked count, tolerance or distance could not be met
-    double solid_volume = 0;   ///< volume of the solid, cubic metres; 0 where there is no inside
+    double solid_volume = 0;   ///< of the solid, cubic metres; 0 where there is no inside, and of exact open meshes
     float solid_volume_error = 0; ///< of solid_volume, relative; found as LevelFigures::outside_ratio_error is
     double diagonal = 0;          ///< of the mesh's bounding box, metres
     Method method = Method::voxel;

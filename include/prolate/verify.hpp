@@ -30,7 +30,8 @@ struct VerifyReport {
 /// Options of verify().
 struct VerifyOptions {
     uint32_t threads = 0; ///< 0 = all cores
-    /// Called between pieces of work with the fraction done; return false to cancel.
+    /// Called now and then, at least some times a second, from one thread at a time, with the fraction done; return
+    /// false to cancel: verify() then ends within a second.
     std::function<bool(double)> progress;
 };
 
