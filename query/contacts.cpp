@@ -155,12 +155,14 @@ private:
     void add(const MeetingPair& pair) {
         if (!settled_) {
             if (d_.found == 0) first_ = pair;
-            double limit = HUGE_VAL;
+            KnownOverlap known;
             patches_.for_each([&](const Patch& p) {
-                if (resolves(p.normal(), p.overlap(), pair)) limit = std::min(limit, p.overlap());
+                if (p.overlap() < known.overlap && resolves(p.normal(), p.overlap(), pair))
+                    known = {p.normal(), p.overlap()};
             });
-            return own(pair, limit, [&](const Contact& c, bool certain) {
-                if (certain) return take(c);
+            return own(pair, known, [&](const Contact& c, bool certain) {
+                // What is no better than what resolves it gives points, not a direction.
+                if (certain) return take(c, c.overlap <= known.overlap + patches_.apart());
                 if (waiting_count_ == kWaiting) flush();
                 waiting_[waiting_count_++] = c;
             });
@@ -168,7 +170,7 @@ private:
         if (pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle)
             for (uint32_t i = 0; i < ways_; ++i)
                 if (resolves(way_[i].normal, way_[i].depth, pair) && along(way_[i].normal, pair, points_[i])) return;
-        own(pair, HUGE_VAL, [&](const Contact& c, bool) {
+        own(pair, {}, [&](const Contact& c, bool) {
             for (uint32_t i = 0; i < ways_; ++i)
                 if (points_[i].takes(c.normal))
                     return points_[i].add(c.normal, candidate(c), 0, c.overlap, patches_.apart());
@@ -245,13 +247,13 @@ private:
         }
     }
 
-    // ---- what a pair says for itself: use(contact, certain), if it overlaps by less than `limit` ----
+    // ---- what a pair says for itself: use(contact, certain), if it is not much longer than the known way ----
 
-    template <class Use> void own(const MeetingPair& pair, double limit, Use&& use) const {
+    template <class Use> void own(const MeetingPair& pair, const KnownOverlap& known, Use&& use) const {
         const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
         if (in_a && in_b) {
             const TriangleContact found =
-                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), d_.options.margin, limit);
+                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), d_.options.margin, known);
             return for_each_point(found, pair, [&](const Contact& c) { use(c, found.faces); });
         }
         if (in_a) return own_mixed(pair, surrounded_a(pair.triangle_a), ellipsoid_b(pair), 1, use);
@@ -289,7 +291,8 @@ private:
             if (!(size > 0)) return;
             const dvec3 n = v / size, w = n * e.factor;
             double depth = highest(t, n) - (glm::dot(n, e.center) - glm::length(w));
-            if (depth < least && !of_face) depth += around.rise(around.highest(n), n, least - depth);
+            Climb climb = around.climb(around.highest(n), n);
+            while (!of_face && depth < least && climb.steps_left > 0) depth += climb.step();
             if (depth < least) least = depth, best = n, deepest = e.center - e.factor * (w / glm::length(w));
         };
         consider(face, true);
@@ -309,16 +312,23 @@ private:
     // climbed along its normal to what is deepest around there, and a ray from it finds the other body's surface.
     void add_deepest(const Patch& from, Patch& to) {
         const dvec3 n = from.normal();
-        for (const Candidate& c : from) {
-            if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
-            add_deepest(c.pair, n, from.overlap(), true, to);
-            add_deepest(c.pair, n, from.overlap(), false, to);
+        for (const bool of_a : {true, false}) {
+            uint32_t seen[Patch::kSieve], count = 0; // vertices
+            for (const Candidate& c : from) {
+                if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
+                const Surrounded around = of_a ? surrounded_a(c.pair.triangle_a) : surrounded_b(c.pair.triangle_b);
+                const dvec3 up = of_a ? n : -n; // out of the body
+                Climb climb = around.climb(around.highest(up), up);
+                while (climb.steps_left > 0) climb.step();
+                if (std::find(seen, seen + count, climb.vertex) != seen + count) continue;
+                seen[count++] = climb.vertex;
+                add_deepest(c.pair, climb.vertex, n, from.overlap(), of_a, to);
+            }
         }
     }
     // A vertex of the one body that lies in the other, its place in A's frame.
-    void add_deepest(const MeetingPair& pair, const dvec3& n, double most, bool of_a, Patch& to) {
-        const dvec3 up = of_a ? n : -n; // out of the body
-        const uint32_t vertex = (of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b)).top(up).vertex;
+    void add_deepest(const MeetingPair& pair, uint32_t vertex, const dvec3& n, double most, bool of_a, Patch& to) {
+        const dvec3 up = of_a ? n : -n;
         const dvec3 here = to_double((of_a ? d_.a : d_.b).tree.vertex(vertex));
         const dvec3 at = of_a ? here : d_.b_to_a.rotation * here + d_.b_to_a.translation;
         // Cast in the other body's frame, against `up`.
@@ -354,7 +364,7 @@ private:
                     whole(first_.node_b, first_.triangle_b),
                     0};
         bool any = false;
-        own(first_, HUGE_VAL, [&](const Contact& c, bool) {
+        own(first_, {}, [&](const Contact& c, bool) {
             if (!any) out = c, any = true;
         });
         if (any) return out;
@@ -373,9 +383,9 @@ private:
         }
         return out;
     }
-    void take(const Contact& c) {
-        const double weight = std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_;
-        patches_.add(c.normal, candidate(c), weight, c.overlap);
+    void take(const Contact& c, bool with_normal) {
+        const double weight = with_normal ? std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_ : 0;
+        patches_.add(c.normal, candidate(c), weight, with_normal ? c.overlap : -HUGE_VAL);
     }
     // What waits counts if no patch resolves it, or only one that is deeper than the pair.
     void flush() {
@@ -386,7 +396,7 @@ private:
                 resolved = resolved || (resolves(p.normal(), p.overlap(), c.pair) &&
                                         (c.overlap < 0 || p.overlap() <= c.overlap + patches_.apart()));
             });
-            if (!resolved) take(c);
+            if (!resolved) take(c, true);
         }
         waiting_count_ = 0;
     }

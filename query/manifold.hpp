@@ -28,6 +28,8 @@ struct Candidate {
 /// Points of about one normal.
 class Patch {
 public:
+    static constexpr uint32_t kSieve = 9; ///< the deepest; the farthest in eight directions
+
     explicit Patch(const glm::dvec3& normal) noexcept;
     Patch() = default;
 
@@ -46,7 +48,6 @@ public:
     uint32_t reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept;
 
 private:
-    static constexpr uint32_t kSieve = 9; // the deepest; the farthest in eight directions
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
     Candidate sieve_[kSieve];
     double reach_[kSieve]; // what each is the best for: depth, or coordinate
