@@ -37,13 +37,12 @@ constexpr double kCellsPerLeaf = 24;      // of the coarser grid that the optimi
 constexpr uint32_t kLeastCells = 48;      // of that grid, along the longest side
 constexpr int kMeterColumns = 192;        // to compare covers while baking
 constexpr int kMeasureColumns = 512;      // of the reported figures
-constexpr double kSmallestRadius = 1e-5;  // of the diagonal
 // How exactly distances are measured, by quality.
 constexpr double kDistanceTolerance[] = {1e-3, 1e-4, 1e-4};  // of the largest one, in diagonals
 constexpr uint32_t kDistanceSamples[] = {2000, 8000, 32000}; // for mean and percentile
 
-// Meshes that the format can hold with all their nodes: a leaf of kSmallestRadius needs an exponent, and the lattice
-// reaches across. Metres, of the box's diagonal.
+// Meshes that the format can hold with all their nodes: a leaf of kThinnestNodeOfMesh needs an exponent, and the
+// lattice reaches across. Metres, of the box's diagonal.
 constexpr double kSmallestMesh = 1e-24, kLargestMesh = 1e22;
 
 // A solid of less than this share of its diagonal's cube has no inside worth the name.
@@ -120,7 +119,7 @@ private:
         report("measure", 0, 0);
         if (closed_) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
         report("split", 0.1, 1);
-        ExactOptions options{options_.degree, options_.leaf_triangles, kSmallestRadius * box_.size().norm(), {}};
+        ExactOptions options{options_.degree, options_.leaf_triangles, min_radius(), {}};
         options.progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); };
         const auto grown = grow_exact(mesh_, options);
         if (!grown) return grown.error();
@@ -179,6 +178,10 @@ private:
     double distance_tolerance() const {
         return kDistanceTolerance[static_cast<size_t>(options_.quality)] * box_.size().norm();
     }
+    double min_radius() const {
+        const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
+        return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
+    }
     // A volume as a share of the solid's.
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 
@@ -218,12 +221,10 @@ private:
         const DistanceField field(mesh_, closed_, winding, std::min(field_resolution, kMaxFieldResolution));
         const Voxels cells = start_cells(winding);
         const Columns columns = measuring_columns(mesh_, closed_, winding, kMeterColumns);
-        const GrowOptions options{options_,
-                                  effort_,
-                                  kSmallestRadius * box_.size().norm(),
-                                  box_.size().norm(),
-                                  &cancelled_,
-                                  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
+        const GrowOptions options{
+            options_,     effort_,
+            min_radius(), box_.size().norm(),
+            &cancelled_,  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
         const auto exact = [&winding, sign = winding_sign_](const Fit& fit) {
             EllipsoidVolume inside = inside_volume(fit, winding);
             inside.volume *= sign, inside.d_center *= sign, inside.d_shape *= sign;

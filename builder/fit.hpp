@@ -3,16 +3,16 @@
 
 #include "builder/eigen.hpp"
 
-#include <prolate/types.hpp>
+#include <prolate/build.hpp>
 
 #include <span>
 #include <vector>
 
 namespace prolate {
 
-/// Largest ratio of two semi-axes that the bake makes. Needles and sheets beyond it are covered by several nodes or a
-/// thicker one. Bounding it bounds the rounding error of float separation tests (design: at most 30 - 50).
-inline constexpr double kMaxAxisRatio = 40;
+/// Largest ratio of two semi-axes that the bake makes: nodes that need to be thinner are thicker (build.hpp). The
+/// runtime's tests are right at any ratio; this is about as thin as the format's integers keep an ellipsoid's shape.
+inline constexpr double kMaxAxisRatio = 1 / kThinnestNode;
 
 /// The ellipsoid {center + L u : |u| <= 1} while it is being fitted, L lower triangular.
 struct Fit {

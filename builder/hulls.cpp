@@ -21,7 +21,8 @@ namespace prolate {
 namespace {
 
 constexpr int kMostSteps = 200;
-// More than rounding costs anywhere below, in unit-ball coordinates: double, and ellipsoids of axis ratios below 100.
+// More than rounding costs anywhere below, in unit-ball coordinates: in double, some 2^-53 times the axis ratio, which
+// is at most 2^14.
 constexpr double kRounding = 1e-9;
 
 // An upper bound on the distance of w from the convex hull of the points, close to it if it is above `enough`.

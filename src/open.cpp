@@ -179,6 +179,8 @@ private:
             return bad("node size out of range", block + at_size);
         if (exponent - step_exponent_ > kMaxNodeSize)
             return bad("a node is too large for the lattice's step", block + at_size);
+        if (exponent - step_exponent_ < kMinNodeSize)
+            return bad("a node is too small for the lattice's step", block + at_size);
         for (size_t i = 0; i < 3; ++i)
             if (const size_t here = block_offset(kBlockDiagonal, i, lane); load_le<uint16_t>(from + here) == 0)
                 return bad("a node has no extent", block + here);

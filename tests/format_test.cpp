@@ -196,8 +196,8 @@ void expect_sound(const TreeView& tree) {
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenExactFileOfVersionFour) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4_exact.etree");
+TEST(Format, GoldenExactFileOfVersionFive) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v5_exact.etree");
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
@@ -238,8 +238,8 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
     }
 }
 
-TEST(Format, GoldenFileOfVersionFour) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4.etree");
+TEST(Format, GoldenFileOfVersionFive) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v5.etree");
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -255,21 +255,21 @@ TEST(Format, GoldenFileOfVersionFour) {
     EXPECT_EQ(tree->level_count(), 3u);
     EXPECT_EQ(tree->degree(), 3u);
     EXPECT_FALSE(tree->is_prefix());
-    // By hand: (origin + q) / 16, d 2^(e - 16), o 2^(e - 15).
+    // By hand: (origin + q) / 16, d^2 2^(e - 30), o |o| 2^(e - 30).
     EXPECT_EQ(tree->ellipsoid(0), (Ellipsoid{{-20 / 16.f, 27 / 16.f, 1030 / 16.f},
-                                             40000 / 32768.f,
-                                             -1000 / 16384.f,
-                                             50000 / 32768.f,
-                                             2000 / 16384.f,
-                                             -3000 / 16384.f,
-                                             60000 / 32768.f}));
+                                             4e4f * 4e4f * 0x1p-29f,
+                                             -1e3f * 1e3f * 0x1p-29f,
+                                             5e4f * 5e4f * 0x1p-29f,
+                                             2e3f * 2e3f * 0x1p-29f,
+                                             -3e3f * 3e3f * 0x1p-29f,
+                                             6e4f * 6e4f * 0x1p-29f}));
     EXPECT_EQ(tree->ellipsoid(8), (Ellipsoid{{-30 / 16.f, 7 / 16.f, 1000 / 16.f},
-                                             1 / 65536.f,
-                                             32767 / 32768.f,
-                                             2 / 65536.f,
+                                             0x1p-30f,
+                                             32767.f * 32767.f * 0x1p-30f,
+                                             4 * 0x1p-30f,
                                              -1.f,
                                              0.f,
-                                             65535 / 65536.f}));
+                                             65535.f * 65535.f * 0x1p-30f}));
     EXPECT_EQ(tree->children(0).first, 8u);
     EXPECT_EQ(tree->children(8).first, 16u);
     EXPECT_EQ(tree->children(8).count, 3u);
@@ -372,7 +372,7 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
     for (const char* name :
-         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree"}) {
+         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v4.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -473,10 +473,11 @@ TEST(Format, NamesTheFirstOffence) {
     const size_t counts = kBlock1 + 152, section = kGoldenHash; // counts of nodes 8 and 9
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
-        {8, {3}, ErrorCode::bad_file, 8},
-        {kBlocks + 144, {19}, ErrorCode::bad_file, kBlocks + 144},         // 23 above the step exponent, -4
+        {8, {4}, ErrorCode::bad_file, 8},
+        {kBlocks + 144, {18}, ErrorCode::bad_file, kBlocks + 144},         // 22 above the step exponent, -4
+        {kBlocks + 144, {0xdd}, ErrorCode::bad_file, kBlocks + 144},       // 31 below
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
-        {8, {5}, ErrorCode::newer_version, 5},
+        {8, {6}, ErrorCode::newer_version, 6},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -574,7 +575,7 @@ TEST(Format, DecodingIsExact) {
             o = static_cast<int32_t>(random.below(2 * format::kMaxCoordinate - 65536)) - format::kMaxCoordinate + 1;
         lattice.step_exponent = static_cast<int32_t>(random.below(181)) - 120;
         PackedNode node;
-        node.exponent = static_cast<int8_t>(static_cast<int>(random.below(201)) - 100);
+        node.exponent = static_cast<int8_t>(static_cast<int>(random.below(191)) - 90);
         for (size_t k = 0; k < 3; ++k) {
             node.center[k] = bits16();
             node.diagonal[k] = std::max<uint16_t>(1, bits16());
@@ -585,8 +586,10 @@ TEST(Format, DecodingIsExact) {
                     off[3] = {e.l21, e.l31, e.l32};
         for (size_t k = 0; k < 3; ++k) {
             ASSERT_EQ(center[k], std::ldexp(1.0 * lattice.origin[k] + node.center[k], lattice.step_exponent));
-            ASSERT_EQ(diagonal[k], std::ldexp(1.0 * node.diagonal[k], node.exponent - 16));
-            ASSERT_EQ(off[k], std::ldexp(1.0 * node.off_diagonal[k], node.exponent - 15));
+            // One rounding, to a float.
+            const auto d = static_cast<float>(node.diagonal[k]), o = static_cast<float>(node.off_diagonal[k]);
+            ASSERT_EQ(diagonal[k], std::ldexp(d * d, node.exponent - 30));
+            ASSERT_EQ(off[k], std::ldexp(o * std::abs(o), node.exponent - 30));
         }
     }
 }
@@ -618,16 +621,17 @@ TEST(Format, QuantisingTakesTheNearest) {
         const Ellipsoid e = format::decode(node, lattice);
         const float decoded[3] = {e.center.x, e.center.y, e.center.z};
         for (size_t k = 0; k < 3; ++k) ASSERT_LE(std::abs(decoded[k] - center[k]), step / 2) << i;
-        const double unit = std::ldexp(1, node.exponent - 16);
+        const double unit = std::ldexp(1, node.exponent - 30);
         const float decoded_factor[6] = {e.l11, e.l21, e.l22, e.l31, e.l32, e.l33};
         double largest = 0;
         for (size_t k = 0; k < 6; ++k) {
             const bool diagonal = k == 0 || k == 2 || k == 5;
-            largest = std::max(largest, std::abs(factor[k]));
-            const double error = std::abs(decoded_factor[k] - factor[k]);
-            ASSERT_LE(error, diagonal && factor[k] < unit ? unit : diagonal ? unit / 2 : unit) << i;
+            largest = std::max(largest, std::abs(factor[k]) / (diagonal ? 4 : 1));
+            const double error = std::abs(decoded_factor[k] - factor[k]), root = std::sqrt(std::abs(factor[k]) / unit);
+            // Half of the gap between two squares; the least integer of the diagonal is 1.
+            ASSERT_LE(error, (root < 1 && diagonal ? 1 : root + 0.5001) * unit + 0x1p-24 * std::abs(factor[k])) << i;
         }
-        ASSERT_LE(unit, std::max(largest, 0x1p-100) * 0x1p-15 * 1.0001) << i; // 16 bits are used
+        ASSERT_LE(unit, std::max(largest, 0x1p-90) * 0x1p-29 * 1.001) << i; // 16 bits are used
         // The lattice is no coarser than 16 bits across or 24 bits from zero ask for.
         double extent = 0, reach = 0;
         for (size_t k = 0; k < 3; ++k) {
@@ -764,7 +768,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 4); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 5); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

@@ -35,7 +35,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
 /// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
-inline constexpr uint32_t kBuilderVersion = 8;
+inline constexpr uint32_t kBuilderVersion = 9;
 
 /// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
 /// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
@@ -73,6 +73,11 @@ struct Build {
     bool goal_reached = true; ///< false: the asked count, tolerance or distance could not be met at this resolution
     double seconds = 0;
 };
+
+/// Nodes are as thin as the solid, down to semi-axes of 1/16384 of the longest one, of 1e-5 of the diagonal of the
+/// mesh's box, and of 2^-21 of its largest coordinate, which is a few steps of a float: what is thinner is covered as if
+/// it were that thick.
+inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kThinnestNodeOfPlace = 0x1p-21;
 
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
