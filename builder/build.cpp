@@ -55,10 +55,11 @@ public:
 
     Result<Build> run(MeshView input) {
         const auto start = Clock::now();
-        auto cleaned = clean(input);
+        auto cleaned = clean(input, options_.weld);
         if (!cleaned) return cleaned.error();
         mesh_ = cleaned->mesh.view();
         closed_ = cleaned->report.closed;
+        margin_ = cleaned->report.weld_distance;
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
         if (options_.exact) return run_exact(cleaned->report, start);
         if (!report("voxelise", 0, 0)) return stopped();
@@ -109,7 +110,8 @@ private:
         if (!report("measure", 0, 0)) return stopped();
         measure_solid(Winding(mesh_));
         if (!report("split", 0.1, 1)) return stopped();
-        ExactOptions options{options_.degree, options_.leaf_triangles, kSmallestRadius * box_.size().norm(), {}};
+        ExactOptions options{
+            options_.degree, options_.leaf_triangles, kSmallestRadius * box_.size().norm(), margin_, {}};
         if (progress_) options.progress = [this](double done) { return report("split", 0.1 + 0.75 * done, 0); };
         const auto grown = grow_exact(mesh_, options);
         if (!grown) return grown.error();
@@ -236,7 +238,7 @@ private:
             format::PackedLevel& level = levels.emplace_back();
             for (const uint32_t index : current) {
                 const GrownNode& node = grown.nodes[index];
-                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_);
+                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_, margin_);
                 if (!packed)
                     return Error{ErrorCode::bad_mesh,
                                  "the mesh is too large or too small for the file format; "
@@ -275,6 +277,8 @@ private:
         info.levels = asked ? options_.levels : 3;
         info.ellipsoids = options_.ellipsoids;
         info.seed = options_.seed;
+        info.placement = mesh_.placement;
+        info.weld = options_.weld;
         info.resolution = resolution_;
         return info;
     }
@@ -344,6 +348,7 @@ private:
 
     MeshView mesh_;
     bool closed_ = false;
+    double margin_ = 0; // by which welding moved points: they are covered as they stood
     Box box_;
     uint32_t resolution_ = 0;
     Quadrature solid_;        // its volume; 0 where there is no inside

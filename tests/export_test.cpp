@@ -341,9 +341,9 @@ TEST_F(Export, PlyAndObjHoldTheEllipsoids) {
     const std::vector<Piece> pieces = some_pieces(20);
     for (const auto& [name, content] : {std::pair{"a.ply", as_ply(pieces, 30)}, {"a.obj", as_obj(pieces, 30)}}) {
         SCOPED_TRACE(name);
-        std::string detail;
-        const auto mesh = load_mesh(file(name, content).c_str(), &detail);
-        ASSERT_TRUE(mesh) << mesh.error().what << detail;
+        ImportReport report;
+        const auto mesh = load_mesh(file(name, content).c_str(), {}, &report);
+        ASSERT_TRUE(mesh) << mesh.error().what << report.detail;
         expect_meshes(*mesh, pieces, 32 * 32 / 2);
     }
 }

@@ -36,8 +36,8 @@ using scenes::Random;
 using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
-constexpr size_t kTable = 144, kRow = 60;
-constexpr size_t kBlocks = 384; // of the golden tree: 144 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kTable = 200, kRow = 60;
+constexpr size_t kBlocks = 384; // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
 constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
 constexpr size_t kGoldenHash = kEnd + kGoldenBlocks * 64; // of the exact one: what follows its hulls
 constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
@@ -88,7 +88,9 @@ BakeInfo golden_info() {
             .levels = 2,
             .ellipsoids = 9,
             .seed = 42,
-            .resolution = 96};
+            .resolution = 96,
+            .placement = {{0.001, -0.001, 0.001}, {500000, -0.5, 5400000}},
+            .weld = 0.0625f};
 }
 Bytes golden() {
     return format::encode(golden_info(), 3, kGoldenLattice, golden_levels());
@@ -196,8 +198,8 @@ void expect_sound(const TreeView& tree) {
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenExactFileOfVersionFour) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4_exact.etree");
+TEST(Format, GoldenExactFileOfVersionFive) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v5_exact.etree");
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
@@ -230,7 +232,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
         info.exact = true;
         PackedLevel root{{{.triangle_count = 1}}};
         const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
-        EXPECT_EQ(bytes.size(), 256 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        EXPECT_EQ(bytes.size(), 320 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
         const auto tree = TreeView::open(bytes);
         ASSERT_TRUE(tree) << tree.error().what;
         EXPECT_EQ(tree->triangle(0), triangle);
@@ -238,8 +240,8 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
     }
 }
 
-TEST(Format, GoldenFileOfVersionFour) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4.etree");
+TEST(Format, GoldenFileOfVersionFive) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v5.etree");
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -298,6 +300,8 @@ TEST(Format, GoldenFileOfVersionFour) {
     EXPECT_EQ(info.goal_reached, expected.goal_reached);
     EXPECT_EQ(info.solid_volume, expected.solid_volume);
     EXPECT_EQ(info.solid_volume_error, expected.solid_volume_error);
+    EXPECT_EQ(info.placement, expected.placement);
+    EXPECT_EQ(info.weld, expected.weld);
     EXPECT_EQ(info.diagonal, expected.diagonal);
     EXPECT_EQ(info.method, expected.method);
     EXPECT_EQ(info.quality, expected.quality);
@@ -372,7 +376,8 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
     for (const char* name :
-         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree"}) {
+         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree",
+          "golden_v4.etree", "golden_v4_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -473,10 +478,10 @@ TEST(Format, NamesTheFirstOffence) {
     const size_t counts = kBlock1 + 152, section = kGoldenHash; // counts of nodes 8 and 9
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
-        {8, {3}, ErrorCode::bad_file, 8},
+        {8, {4}, ErrorCode::bad_file, 8},
         {kBlocks + 144, {19}, ErrorCode::bad_file, kBlocks + 144},         // 23 above the step exponent, -4
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
-        {8, {5}, ErrorCode::newer_version, 5},
+        {8, {6}, ErrorCode::newer_version, 6},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -503,6 +508,11 @@ TEST(Format, NamesTheFirstOffence) {
         {128, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 128},  // infinite diagonal
         {136, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 136},              // negative error
         {140, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 140},              // distance not a number
+        {152, {0, 0, 0, 0, 0, 0, 0, 0x80}, ErrorCode::bad_file, 152},     // a scale of 0
+        {160, {0, 0, 0, 0, 0, 0, 0xf8, 0x7f}, ErrorCode::bad_file, 160},  // a scale that is no number
+        {184, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 184},  // an infinite mesh origin
+        {192, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, 192},              // an infinite weld
+        {196, {1}, ErrorCode::bad_file, 196},                             // reserved
         {kTable, {1}, ErrorCode::bad_file, kTable},                       // first block of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
@@ -514,7 +524,7 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
         {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
-        {kBlocks - 60, {1}, ErrorCode::bad_file, kBlocks - 60},                 // padding
+        {kBlocks - 4, {1}, ErrorCode::bad_file, kBlocks - 4},                 // padding
         {kBlocks - 1, {1}, ErrorCode::bad_file, kBlocks - 1},
         {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},     // first child
         {counts, {4}, ErrorCode::bad_file, counts},                   // more children than the degree

@@ -25,6 +25,7 @@ struct BuildOptions {
     float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
     float beta = 0.5f;                          ///< weight of E_vol, >= 0; alpha + beta > 0
     uint64_t seed = 1;                          ///< of all that is drawn at random
+    float weld = kDefaultWeld;                  ///< tolerance for vertices that nearly meet, metres: see clean()
     bool exact = false;                         ///< make an exact tree (tree.hpp)
     uint32_t leaf_triangles = 4;                ///< triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
     uint32_t threads = 0;                       ///< 0 = all cores. The bytes do not depend on it.
@@ -35,7 +36,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
 /// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
-inline constexpr uint32_t kBuilderVersion = 8;
+inline constexpr uint32_t kBuilderVersion = 9;
 
 /// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
 /// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
