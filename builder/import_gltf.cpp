@@ -14,6 +14,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <iterator>
 #include <map>
 #include <utility>
@@ -347,6 +348,21 @@ private:
     uint64_t left_out_ = 0, skinned_ = 0, morphed_ = 0;
 };
 
+// Files that the JSON names are read as they are named: no "~", no wildcards.
+bool file_exists(const std::string& path, void*) {
+    return std::ifstream(path).good();
+}
+std::string same_path(const std::string& path, void*) {
+    return path;
+}
+bool read_whole_file(std::vector<unsigned char>* out, std::string* error, const std::string& path, void*) {
+    std::ifstream file(path, std::ios::binary);
+    out->assign(std::istreambuf_iterator<char>(file), {});
+    if (!file.bad() && file.is_open()) return true;
+    *error += "cannot read " + path;
+    return false;
+}
+
 // Pictures are of no interest: they stay undecoded, whatever they are.
 bool ignore_image(tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
     return true;
@@ -377,6 +393,7 @@ Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const 
     const size_t slash = path.rfind('/');
     const std::string folder = slash == path.npos ? "." : path.substr(0, slash + 1);
     tinygltf::TinyGLTF loader;
+    loader.SetFsCallbacks({file_exists, same_path, read_whole_file, nullptr, nullptr});
     loader.SetImageLoader(ignore_image, nullptr);
     tinygltf::Model model;
     std::string error, warning;

@@ -74,11 +74,22 @@ std::array<double, 3> newell(std::span<const Vec3> points, std::span<const uint3
     return normal;
 }
 
+// Twice the area by which corners, each moved to the next float, change that of the polygon, at most.
+double twice_rounding(std::span<const Vec3> points, std::span<const uint32_t> corners) {
+    double length = 0, largest = 0;
+    for (size_t i = 0; i < corners.size(); ++i) {
+        const Vec3 &p = points[corners[i]], &q = points[corners[(i + 1) % corners.size()]];
+        length += std::abs(double{p.x} - q.x) + std::abs(double{p.y} - q.y) + std::abs(double{p.z} - q.z);
+        largest = std::max({largest, std::abs(double{p.x}), std::abs(double{p.y}), std::abs(double{p.z})});
+    }
+    return 2 * length * largest * double{std::numeric_limits<float>::epsilon()};
+}
+
 class EarClipping {
 public:
-    // The polygon turns left.
-    explicit EarClipping(std::vector<Flat> corners)
-        : at_(std::move(corners)), count_(static_cast<uint32_t>(at_.size())) {
+    // The polygon turns left. Its area is known to `rounding`.
+    EarClipping(std::vector<Flat> corners, double rounding)
+        : at_(std::move(corners)), count_(static_cast<uint32_t>(at_.size())), rounding_(rounding) {
         next_.resize(count_), previous_.resize(count_), alive_.assign(count_, true);
         for (uint32_t i = 0; i < count_; ++i) next_[i] = (i + 1) % count_, previous_[(i + 1) % count_] = i;
         find_obstacles();
@@ -115,7 +126,7 @@ public:
             cut(least_evil(corner));
         }
         cut(next_[corner]);
-        return std::abs(triangles - polygon) <= 2 * rounding();
+        return std::abs(triangles - polygon) <= 2 * rounding_;
     }
 
 private:
@@ -158,12 +169,31 @@ private:
         if (turn(a, b, c) <= 0) return false;
         const auto [x_low, x_high] = std::minmax({a.x, b.x, c.x});
         const auto [y_low, y_high] = std::minmax({a.y, b.y, c.y});
+        bool is_touched = false;
         const uint32_t last_x = cell(x_high, low_.x, high_.x), last_y = cell(y_high, low_.y, high_.y);
         for (uint32_t x = cell(x_low, low_.x, high_.x); x <= last_x; ++x)
             for (uint32_t y = cell(y_low, low_.y, high_.y); y <= last_y; ++y)
-                for (const uint32_t w : in_cell_[size_t{x} * cells_ + y])
-                    if (alive_[w] && w != p && w != q && w != r && enters(w, a, b, c)) return false;
-        return true;
+                for (const uint32_t w : in_cell_[size_t{x} * cells_ + y]) {
+                    if (!alive_[w] || w == p || w == q || w == r) continue;
+                    if (enters(w, a, b, c)) return false;
+                    is_touched |= at_[w] == b;
+                }
+        // Where the border comes by twice, both triangles there may turn left, and one of them be outside.
+        return !is_touched || winding((double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, q) > 0;
+    }
+    // Of the border that is left, around a point.
+    int winding(double x, double y, uint32_t first) const {
+        int number = 0;
+        uint32_t i = first;
+        do {
+            const Flat &from = at_[i], &to = at_[next_[i]];
+            if ((from.y <= y) != (to.y <= y)) {
+                const double side = (double{to.x} - from.x) * (y - from.y) - (double{to.y} - from.y) * (x - from.x);
+                if ((side > 0) == (to.y > from.y)) number += to.y > from.y ? 1 : -1;
+            }
+            i = next_[i];
+        } while (i != first);
+        return number;
     }
     // Does an edge at corner w pass through the inside of the triangle a, b, c?
     bool enters(uint32_t w, const Flat& a, const Flat& b, const Flat& c) const {
@@ -191,19 +221,10 @@ private:
         } while (q != corner);
         return best;
     }
-    // Twice the area by which corners, each moved to the next float, change that of the polygon, at most.
-    double rounding() const {
-        const float largest = std::max({std::abs(low_.x), std::abs(low_.y), std::abs(high_.x), std::abs(high_.y)});
-        double length = 0;
-        for (uint32_t i = 0; i < count_; ++i) {
-            const Flat &p = at_[i], &q = at_[(i + 1) % count_];
-            length += std::abs(double{p.x} - q.x) + std::abs(double{p.y} - q.y);
-        }
-        return 2 * length * largest * double{std::numeric_limits<float>::epsilon()};
-    }
 
     const std::vector<Flat> at_;
     const uint32_t count_;
+    const double rounding_;
     std::vector<uint32_t> next_, previous_;
     std::vector<bool> alive_;
     Flat low_{}, high_{};
@@ -232,7 +253,14 @@ bool triangulate(std::span<const Vec3> points, std::span<const uint32_t> corners
     }
     std::vector<std::array<uint32_t, 3>> found;
     found.reserve(corners.size() - 2);
-    if (!EarClipping(std::move(flat)).run(found)) return false;
+    const double rounding = twice_rounding(points, corners);
+    if (!EarClipping(std::move(flat), rounding).run(found)) return false;
+    // Seen from where it has no area, a polygon must have none: else it is a figure of eight.
+    const auto length = [](const std::array<double, 3>& v) { return std::hypot(v[0], v[1], v[2]); };
+    if (length(normal) <= rounding)
+        for (const auto& [a, b, c] : found)
+            if (const uint32_t t[] = {corners[a], corners[b], corners[c]}; length(newell(points, t)) > rounding)
+                return false;
     for (const auto& [a, b, c] : found) out.push_back({corners[a], corners[b], corners[c]});
     return true;
 }
