@@ -41,10 +41,6 @@ constexpr int kMeasureColumns = 512;      // of the reported figures
 constexpr double kDistanceTolerance[] = {1e-3, 1e-4, 1e-4};  // of the largest one, in diagonals
 constexpr uint32_t kDistanceSamples[] = {2000, 8000, 32000}; // for mean and percentile
 
-// Meshes that the format can hold with all their nodes: a leaf of kThinnestNodeOfMesh needs an exponent, and the
-// lattice reaches across. Metres, of the box's diagonal.
-constexpr double kSmallestMesh = 1e-24, kLargestMesh = 1e22;
-
 // A solid of less than this share of its diagonal's cube has no inside worth the name.
 constexpr double kNoInside = 1e-12;
 // Volume that may lie in several overlapping parts of a mesh, for the analytic method: share of the solid.
@@ -64,15 +60,12 @@ public:
 private:
     Result<Build> run(MeshView input) {
         const auto start = Clock::now();
-        auto cleaned = clean(input);
+        auto cleaned = clean(input, options_.weld);
         if (!cleaned) return cleaned.error();
         mesh_ = cleaned->mesh.view();
         closed_ = cleaned->report.closed;
+        margin_ = cleaned->report.weld_distance;
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
-        if (box_.size().norm() < kSmallestMesh)
-            return Error{ErrorCode::bad_mesh, "the mesh is less than 1e-24 m across; give it in another unit", 0};
-        if (box_.size().norm() > kLargestMesh)
-            return Error{ErrorCode::bad_mesh, "the mesh is more than 1e22 m across; give it in another unit", 0};
         if (options_.exact) return run_exact(cleaned->report, start);
         report("voxelise", 0, 0);
 
@@ -119,7 +112,7 @@ private:
         report("measure", 0, 0);
         if (closed_) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
         report("split", 0.1, 1);
-        ExactOptions options{options_.degree, options_.leaf_triangles, min_radius(), {}};
+        ExactOptions options{options_.degree, options_.leaf_triangles, min_radius(), margin_, {}};
         options.progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); };
         const auto grown = grow_exact(mesh_, options);
         if (!grown) return grown.error();
@@ -255,7 +248,7 @@ private:
             format::PackedLevel& level = levels.emplace_back();
             for (const uint32_t index : current) {
                 const GrownNode& node = grown.nodes[index];
-                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_);
+                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_, margin_);
                 if (!packed)
                     return Error{ErrorCode::bad_mesh,
                                  "the mesh is too large or too small for the file format; "
@@ -294,6 +287,8 @@ private:
         info.levels = asked ? options_.levels : 3;
         info.ellipsoids = options_.ellipsoids;
         info.seed = options_.seed;
+        info.placement = mesh_.placement;
+        info.weld = options_.weld;
         info.resolution = resolution_;
         return info;
     }
@@ -367,6 +362,7 @@ private:
 
     MeshView mesh_;
     bool closed_ = false;
+    double margin_ = 0; // by which welding moved points: they are covered as they stood
     Box box_;
     uint32_t resolution_ = 0;
     Quadrature solid_;        // its volume; 0 where there is no inside

@@ -142,8 +142,14 @@ std::optional<format::PackedNode> covering_node(const Fit& given, const format::
 }
 
 std::optional<format::PackedNode> covering_node(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members,
-                                                const format::Lattice& lattice) {
-    return covering_node(fit, lattice, [&](const Fit& decoded) { return reach_of(decoded, pieces, members); });
+                                                const format::Lattice& lattice, double margin) {
+    return covering_node(fit, lattice, [&](const Fit& decoded) {
+        return reach_of(decoded, pieces, members) + radial_margin(decoded, margin);
+    });
+}
+
+double radial_margin(const Fit& fit, double margin) {
+    return margin * fit.inverse.norm();
 }
 
 double surface_error(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members) {

@@ -396,7 +396,7 @@ private:
         const auto reach = [&](const Fit& decoded) {
             double largest = 0;
             for_each_corner(node, [&](const Vec& p) { largest = std::max(largest, decoded.radial_squared(p)); });
-            return std::sqrt(largest);
+            return std::sqrt(largest) + radial_margin(decoded, options_.margin);
         };
         const auto packed = covering_node(fit, lattice_, reach);
         if (!packed) {

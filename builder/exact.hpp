@@ -16,6 +16,7 @@ struct ExactOptions {
     uint32_t degree;
     uint32_t leaf_triangles; ///< at most, 1 ... kMaxLeafTriangles
     double min_radius;       ///< metres; keeps flat nodes from flat ellipsoids
+    double margin;           ///< metres; ellipsoids hold all points within it of their triangles
     /// Called now and then with the share that is done.
     std::function<void(double)> progress;
 };

@@ -13,6 +13,8 @@
 //
 // Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners
 // of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
+// Where welding closed the mesh, the distance by which it moved points is added: whatever is within it of a point that
+// an ellipsoid holds by that margin, the ellipsoid holds.
 //
 // Shares no data with the bake: other boxes, other inside test (dipole tree instead of columns).
 //
@@ -383,7 +385,7 @@ LevelProof prove_level(const std::vector<Shape>& shapes, const std::vector<Cell>
 }
 
 Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::function<void(double)>& progress) {
-    auto cleaned = clean(mesh);
+    auto cleaned = clean(mesh, tree.bake_info().weld);
     if (!cleaned) return cleaned.error();
     const MeshView surface = cleaned->mesh.view();
 
@@ -396,7 +398,8 @@ Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::f
     Box box;
     for (const Vec3& v : surface.vertices) box.add(to_vec(v));
     const double size = box.size().norm();
-    const double rounding = kTolerance * std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff());
+    const double rounding = kTolerance * std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff()) +
+                            cleaned->report.weld_distance;
     // Not the mesh's own box: halving that one would cut symmetric models in their planes of symmetry.
     box.low -= 0.0137 * Vec::Constant(size);
     box.high += 0.0171 * Vec::Constant(size);

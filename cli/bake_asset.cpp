@@ -15,21 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user should know of the mesh, one line each.
-void diagnose(const std::string& mesh, const MeshReport& report) {
-    // Some readers give each triangle corners of its own, so the number merged says little of the file.
-    const uint32_t distinct = report.input_vertices - report.merged_vertices - report.unused_vertices;
-    note(mesh, fmt::format("{} triangles on {} distinct vertices ({} as read)", grouped(report.input_triangles),
-                           grouped(distinct), grouped(report.input_vertices)));
-    if (report.degenerate_triangles > 0)
-        note(mesh, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
-    if (report.non_manifold_edges > 0)
-        note(mesh, fmt::format("{} edges belong to three or more triangles", grouped(report.non_manifold_edges)));
-    if (!report.closed)
-        note(mesh, fmt::format("{} open edges: no inside can be promised, baked in surface mode",
-                               grouped(report.open_edges)));
-}
-
 // A bake can take long: knows first that there is a place for its result, and that it is not the input.
 int check_files(const Asset& a) {
     std::error_code none;
@@ -64,26 +49,28 @@ std::optional<Baked> reuse(std::optional<Tree>& old, const BakeCache& cache, uin
 std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const std::string& label, int& code) {
     const auto options = options_of(a, code);
     if (!options) return {};
+    const auto import = import_options(a.mesh_options, code);
+    if (!import) return {};
     if (code = check_files(a); code != kDone) return {};
     const uint64_t key = hash(*options);
     std::optional<Tree> old = force ? std::nullopt : old_output(a);
 
     // The file's bytes say which mesh it is, if they have been seen before.
     std::optional<uint64_t> file;
-    if (cache) file = hash_mesh_file(a.mesh.c_str());
+    if (cache) file = hash_mesh_file(a.mesh.c_str(), *import);
     if (file && !force)
         if (const auto seen = cache.find_source(*file))
             if (auto baked = reuse(old, cache, *seen, key)) return baked;
 
-    const auto mesh = read_mesh(a.mesh, code);
+    const auto mesh = read_mesh(a.mesh, code, *import);
     if (!mesh) return {};
     // The mesh itself says it, if there is anything to compare it with.
     if ((old && old->view().bake_info().options_hash == key) || cache) {
-        const auto cleaned = clean(mesh->view());
+        const auto cleaned = clean(mesh->view(), options->weld);
         if (!cleaned) return code = complain(a.mesh, cleaned.error()), std::nullopt;
         const uint64_t source = hash(cleaned->mesh.view());
         // Remembered only if the file was the same before and after it was read.
-        if (file && *file == hash_mesh_file(a.mesh.c_str())) cache.keep_source(*file, source);
+        if (file && *file == hash_mesh_file(a.mesh.c_str(), *import)) cache.keep_source(*file, source);
         if (!force)
             if (auto baked = reuse(old, cache, source, key)) {
                 baked->diagnosis = cleaned->report;
@@ -97,7 +84,7 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const st
     }();
     if (built && interrupted()) built = Error{ErrorCode::cancelled};
     if (!built) return code = complain(a.mesh, built.error()), std::nullopt;
-    diagnose(a.mesh, built->mesh);
+    describe_mesh(a.mesh, built->mesh);
     Baked baked{Source::baked, std::move(built->tree), built->mesh, {}};
     for (const LevelReport& level : built->levels) baked.level_seconds.push_back(level.seconds);
     return baked;
@@ -106,8 +93,11 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const st
 } // namespace
 
 void declare_asset_options(CLI::App& app, Asset& a) {
-    app.add_option("mesh", a.mesh, "the mesh: OBJ, PLY, STL, OFF, glTF, GLB, 3DS or DAE");
+    app.add_option("mesh", a.mesh, "the mesh: OBJ, PLY, STL, OFF, glTF, GLB, 3MF, 3DS or DAE");
     app.add_option("-o,--output", a.output, "the .etree file to write, or - for standard output");
+    declare_mesh_options(app, a.mesh_options);
+    app.add_option("--weld", a.mesh_options.weld,
+                   "join vertices of open edges within this length, if that closes the mesh (default: 8 float steps)");
     app.add_option("--degree", a.options.degree, "children of a node, 2 ... 64")->capture_default_str();
     app.add_option("--levels", a.levels, "levels below the root, 1 ... 31");
     app.add_option("--ellipsoids", a.ellipsoids, "number of leaves, 1 ... 65536: the best set of so many");
@@ -165,6 +155,9 @@ std::optional<BuildOptions> options_of(const Asset& a, int& code) {
     if (a.ellipsoids == 0u) return refuse("--ellipsoids", "must be 1 to 65536", "see 'prolate bake --help'");
     if (a.tolerance == 0.0f) return refuse("--tolerance", "must be above 0", "see 'prolate bake --help'");
     if (a.distance == 0.0f) return refuse("--distance", "must be above 0", "see 'prolate bake --help'");
+    if (a.mesh_options.weld && !(*a.mesh_options.weld >= 0))
+        return refuse("--weld", "must be a length, or 0", "see 'prolate bake --help'");
+    options.weld = a.mesh_options.weld.value_or(kDefaultWeld);
     options.levels = a.levels.value_or(0);
     options.ellipsoids = a.ellipsoids.value_or(0);
     options.tolerance = a.tolerance.value_or(0);
@@ -203,6 +196,10 @@ nlohmann::ordered_json report_of(const Asset& a, const Baked& baked) {
                             {"input_triangles", m.input_triangles},
                             {"merged_vertices", m.merged_vertices},
                             {"unused_vertices", m.unused_vertices},
+                            {"welded_vertices", m.welded_vertices},
+                            {"weld_distance", m.weld_distance},
+                            {"turned_shells", m.turned_shells},
+                            {"size", m.size},
                             {"degenerate_triangles", m.degenerate_triangles},
                             {"open_edges", m.open_edges},
                             {"non_manifold_edges", m.non_manifold_edges},

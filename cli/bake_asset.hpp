@@ -3,6 +3,7 @@
 #pragma once
 
 #include "cli/cache.hpp"
+#include "cli/mesh_options.hpp"
 
 #include <prolate/build.hpp>
 
@@ -24,6 +25,7 @@ struct Asset {
     std::string method = "voxel", primitive = "ellipsoid", quality = "normal";
     std::optional<uint32_t> levels, ellipsoids;
     std::optional<float> tolerance, distance;
+    MeshOptions mesh_options;
     BuildOptions options;
 };
 

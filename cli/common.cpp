@@ -100,7 +100,13 @@ int complain_with_advice(std::string_view subject, const Error& error, std::stri
                          std::string_view advice) {
     if (error.code == ErrorCode::cancelled)
         return complain(kInterrupted, subject, "interrupted", "nothing was written");
-    return complain(exit_code(error.code), subject, words_of(error, detail), advice);
+    // An error that brings its own advice says it behind a "; ".
+    const std::string_view what = error.what;
+    const size_t own = what.find("; ");
+    if (own == what.npos) return complain(exit_code(error.code), subject, words_of(error, detail), advice);
+    const std::string before(what.substr(0, own));
+    return complain(exit_code(error.code), subject, words_of({error.code, before.c_str(), error.where}, detail),
+                    what.substr(own + 2));
 }
 
 extern "C" void on_signal(int) {
@@ -148,13 +154,16 @@ const std::string& PartOfWork::complaint() const {
     return last_complaint;
 }
 
-std::optional<Mesh> read_mesh(const std::string& path, int& code) {
-    std::string detail;
-    auto mesh = load_mesh(path.c_str(), &detail);
-    if (mesh) return std::move(*mesh);
-    code = complain_with_advice(path, mesh.error(), detail,
+std::optional<Mesh> read_mesh(const std::string& path, int& code, const ImportOptions& options) {
+    ImportReport report;
+    auto mesh = load_mesh(path.c_str(), options, &report);
+    if (mesh) {
+        for (const std::string& line : report.notes) note(path, line);
+        return std::move(*mesh);
+    }
+    code = complain_with_advice(path, mesh.error(), report.detail,
                                 mesh.error().code == ErrorCode::bad_file
-                                    ? "export the mesh again, as OBJ, PLY, STL, OFF, glTF, GLB, 3DS or DAE"
+                                    ? "export the mesh again, as OBJ, PLY, STL, OFF, glTF, GLB, 3MF, 3DS or DAE"
                                     : advice_for(mesh.error()));
     return {};
 }

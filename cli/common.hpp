@@ -75,8 +75,8 @@ public:
     const std::string& complaint() const;
 };
 
-/// Reads a mesh or a tree; reports the reason and sets `code` if it cannot.
-std::optional<Mesh> read_mesh(const std::string& path, int& code);
+/// Reads a mesh or a tree; reports the reason and sets `code` if it cannot. What is to be known of the import is noted.
+std::optional<Mesh> read_mesh(const std::string& path, int& code, const ImportOptions& options = {});
 std::optional<Tree> read_tree(const std::string& path, int& code);
 
 /// True for "-" and "/dev/stdout".

@@ -62,6 +62,12 @@ std::string as_text(const std::string& name, const TreeView& tree) {
         out += fmt::format("  covers    {} of volume {:.6g} (+/- {:.0e}), diagonal {:.6g}\n",
                            info.exact ? "the surface of a solid" : "a solid", info.solid_volume,
                            info.solid_volume * double{info.solid_volume_error}, info.diagonal);
+    if (const auto& [x, y, z] = info.placement.scale; info.placement.scale != Placement{}.scale)
+        out += fmt::format("  scale     the mesh's file times {:g}, {:g}, {:g}\n", x, y, z);
+    if (const auto& [x, y, z] = info.placement.origin; info.placement.origin != Placement{}.origin)
+        out += fmt::format(
+            "  origin    ({:.12g}, {:.12g}, {:.12g}): all coordinates here and in answers are relative to it\n", x, y,
+            z);
     if (!info.exact)
         out += fmt::format("  baked     method {}, primitive {}, quality {}, alpha {:g}, beta {:g}, seed {}, "
                            "resolution {}\n",

@@ -116,6 +116,9 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["solid_volume"] = info.solid_volume;
     out["solid_volume_error"] = shortest(info.solid_volume * double{info.solid_volume_error});
     out["diagonal"] = info.diagonal;
+    out["scale"] = info.placement.scale;
+    out["origin"] = info.placement.origin;
+    out["weld"] = info.weld < 0 ? nlohmann::ordered_json("default") : nlohmann::ordered_json(shortest(info.weld));
     out["resolution"] = info.resolution;
     return out;
 }

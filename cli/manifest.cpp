@@ -62,6 +62,11 @@ std::string wrong_type(const CLI::Option& option, const Json& value) {
     if (option.get_items_expected_max() == 0) return value.is_boolean() ? "" : "true or false";
     const std::string type = option.get_type_name();
     if (type == "UINT") return value.is_number_unsigned() ? "" : "a whole number, 0 or above";
+    if (option.get_items_expected_max() > 1) {
+        const auto is_number = [](const Json& one) { return one.is_number(); };
+        const bool sound = value.is_array() && std::all_of(value.begin(), value.end(), is_number);
+        return sound || value.is_number() ? "" : "a number or an array of numbers";
+    }
     if (type == "FLOAT") return value.is_number() ? "" : "a number";
     return value.is_string() ? "" : "a text";
 }
@@ -82,7 +87,8 @@ std::string set_options(const Json& values, Asset& asset) {
         if (value.is_boolean()) {
             if (value.get<bool>()) words.push_back("--" + key);
         } else {
-            const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+            std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+            if (value.is_array()) text = text.substr(1, text.size() - 2); // [1,2,3]
             if (text.empty()) return fmt::format("\"{}\" must not be empty", key);
             if (positional)
                 asset.mesh = text;

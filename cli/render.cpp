@@ -1,5 +1,6 @@
 // prolate render: a picture of a tree, level by level.
 #include "cli/common.hpp"
+#include "cli/mesh_options.hpp"
 #include "cli/render_sheet.hpp"
 
 #include <CLI/CLI.hpp>
@@ -16,6 +17,7 @@ constexpr const char* kMeshStyles[] = {"beside", "overlay", "none"}; // in the o
 
 struct RenderArguments {
     std::string tree, mesh, output;
+    MeshOptions mesh_options;
     std::string size = "1600x1200";
     std::vector<double> view = {View{}.azimuth, View{}.elevation};
     std::vector<uint32_t> levels;
@@ -80,9 +82,12 @@ int run(const RenderArguments& a) {
 
     std::optional<CleanMesh> mesh;
     if (!a.mesh.empty()) {
-        const auto raw = read_mesh(a.mesh, code);
+        const BakeInfo info = view.bake_info();
+        const auto import = import_options(a.mesh_options, code, info.placement);
+        if (!import) return code;
+        const auto raw = read_mesh(a.mesh, code, *import);
         if (!raw) return code;
-        auto cleaned = clean(raw->view());
+        auto cleaned = clean(raw->view(), info.weld);
         if (!cleaned) return complain(a.mesh, cleaned.error());
         mesh = std::move(*cleaned);
     }
@@ -116,6 +121,7 @@ void add_render(CLI::App& app, Work& chosen) {
     command->add_option("tree", a->tree, "the .etree file")->required();
     command->add_option("mesh", a->mesh, "the mesh that it was baked from");
     command->add_option("-o,--output", a->output, "the PNG file to write, or - for standard output")->required();
+    declare_mesh_options(*command, a->mesh_options, true);
     command->add_option("--size", a->size, "width and height of the picture, pixels")->capture_default_str();
     command->add_option("--levels", a->levels, "levels to show, as 0,1,2 (default: 1, 2 and 3, as far as they exist)")
         ->delimiter(',')

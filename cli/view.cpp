@@ -1,5 +1,6 @@
 // prolate view: trees to look at, and to move against each other, as one page for a browser.
 #include "cli/common.hpp"
+#include "cli/mesh_options.hpp"
 #include "cli/pose.hpp"
 #include "cli/render_panel.hpp"
 #include "cli/view_scene.hpp"
@@ -33,6 +34,7 @@ Examples:
 struct ViewArguments {
     std::vector<std::string> files;
     std::string output, up = "y", pose;
+    MeshOptions mesh_options;
 };
 
 bool is_tree(const std::string& path) {
@@ -70,7 +72,7 @@ std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& fil
     return assets;
 }
 
-int read_asset(Asset& asset) {
+int read_asset(Asset& asset, const MeshOptions& mesh_options) {
     int code = kDone;
     asset.tree = read_tree(asset.tree_path, code);
     if (!asset.tree) return code;
@@ -78,11 +80,14 @@ int read_asset(Asset& asset) {
         if (asset.tree->view().has_triangles()) asset.mesh = mesh_of(asset.tree->view());
         return kDone;
     }
-    const auto raw = read_mesh(asset.mesh_path, code);
+    const BakeInfo info = asset.tree->view().bake_info();
+    const auto import = import_options(mesh_options, code, info.placement);
+    if (!import) return code;
+    const auto raw = read_mesh(asset.mesh_path, code, *import);
     if (!raw) return code;
-    auto cleaned = clean(raw->view());
+    auto cleaned = clean(raw->view(), info.weld);
     if (!cleaned) return complain(asset.mesh_path, cleaned.error());
-    asset.own_mesh = hash(cleaned->mesh.view()) == asset.tree->view().bake_info().source_hash;
+    asset.own_mesh = hash(cleaned->mesh.view()) == info.source_hash;
     if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
     asset.mesh = std::move(*cleaned);
     return kDone;
@@ -119,7 +124,7 @@ int run(const ViewArguments& a) {
     scene["bodies"] = nlohmann::ordered_json::array();
     NumberBlock numbers;
     for (Asset& asset : *assets) {
-        if (const int code = read_asset(asset); code != kDone) return code;
+        if (const int code = read_asset(asset, a.mesh_options); code != kDone) return code;
         ProgressLine line;
         auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
                                std::move(asset.mesh), asset.own_mesh},
@@ -139,6 +144,7 @@ void add_view(CLI::App& app, Work& chosen) {
         ->required()
         ->type_name("TREE [MESH] [TREE [MESH]]");
     command->add_option("-o,--output", a->output, "the HTML file to write, or - for standard output")->required();
+    declare_mesh_options(*command, a->mesh_options, true);
     command->add_option("--pose", a->pose, "of the second body in the frame of the first: tx,ty,tz[,qx,qy,qz,qw]");
     command->add_option("--up", a->up, "the models' axis that points up")
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))

@@ -99,6 +99,11 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     store_le(h + kAtResolution, info.resolution);
     store_le(h + kAtSolidVolumeError, info.solid_volume_error);
     store_le(h + kAtDiagonal, info.diagonal);
+    for (size_t i = 0; i < 3; ++i) {
+        store_le(h + kAtScale + 8 * i, info.placement.scale[i]);
+        store_le(h + kAtMeshOrigin + 8 * i, info.placement.origin[i]);
+    }
+    store_le(h + kAtWeld, info.weld);
     if (info.exact) {
         store_le(h + kAtVertexCount, vertex_count);
         store_le(h + kAtTriangleCount, triangle_count);

@@ -80,6 +80,15 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     if (!is_metric(load_le<double>(h + kAtDiagonal))) return bad("diagonal out of range", kAtDiagonal);
     if (!is_metric(load_le<float>(h + kAtSolidVolumeError)))
         return bad("solid volume error out of range", kAtSolidVolumeError);
+    for (size_t i = 0; i < 3; ++i) {
+        const double scale = load_le<double>(h + kAtScale + 8 * i);
+        if (!std::isfinite(scale) || scale == 0) return bad("scale of the mesh out of range", kAtScale + 8 * i);
+        if (!std::isfinite(load_le<double>(h + kAtMeshOrigin + 8 * i)))
+            return bad("origin of the mesh out of range", kAtMeshOrigin + 8 * i);
+    }
+    if (!std::isfinite(load_le<float>(h + kAtWeld))) return bad("option out of range", kAtWeld);
+    if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
+        return bad("reserved bytes are not zero", kAtReserved2);
     if (!(flags & kExact)) {
         if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
             return bad("triangle counts of a tree without triangles", kAtVertexCount);

@@ -348,9 +348,9 @@ TEST_F(Export, PlyAndObjHoldTheEllipsoids) {
     for (const auto& [name, content] : {std::pair{"a.ply", as_ply(pieces, 30, Facets::inscribed)},
                                         {"a.obj", as_obj(pieces, 30, Facets::inscribed)}}) {
         SCOPED_TRACE(name);
-        std::string detail;
-        const auto mesh = load_mesh(file(name, content).c_str(), &detail);
-        ASSERT_TRUE(mesh) << mesh.error().what << detail;
+        ImportReport report;
+        const auto mesh = load_mesh(file(name, content).c_str(), {}, &report);
+        ASSERT_TRUE(mesh) << mesh.error().what << report.detail;
         expect_meshes(*mesh, pieces, 32 * 32 / 2);
     }
 }

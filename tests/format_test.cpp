@@ -36,8 +36,8 @@ using scenes::Random;
 using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
-constexpr size_t kTable = 144, kRow = 60;
-constexpr size_t kBlocks = 384; // of the golden tree: 144 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kTable = 200, kRow = 60;
+constexpr size_t kBlocks = 384; // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
 constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
 constexpr size_t kGoldenHash = kEnd + kGoldenBlocks * 64; // of the exact one: what follows its hulls
 constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
@@ -88,7 +88,9 @@ BakeInfo golden_info() {
             .levels = 2,
             .ellipsoids = 9,
             .seed = 42,
-            .resolution = 96};
+            .resolution = 96,
+            .placement = {{0.001, -0.001, 0.001}, {500000, -0.5, 5400000}},
+            .weld = 0.0625f};
 }
 Bytes golden() {
     return format::encode(golden_info(), 3, kGoldenLattice, golden_levels());
@@ -230,7 +232,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
         info.exact = true;
         PackedLevel root{{{.triangle_count = 1}}};
         const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
-        EXPECT_EQ(bytes.size(), 256 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        EXPECT_EQ(bytes.size(), 320 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
         const auto tree = TreeView::open(bytes);
         ASSERT_TRUE(tree) << tree.error().what;
         EXPECT_EQ(tree->triangle(0), triangle);
@@ -298,6 +300,8 @@ TEST(Format, GoldenFileOfVersionFive) {
     EXPECT_EQ(info.goal_reached, expected.goal_reached);
     EXPECT_EQ(info.solid_volume, expected.solid_volume);
     EXPECT_EQ(info.solid_volume_error, expected.solid_volume_error);
+    EXPECT_EQ(info.placement, expected.placement);
+    EXPECT_EQ(info.weld, expected.weld);
     EXPECT_EQ(info.diagonal, expected.diagonal);
     EXPECT_EQ(info.method, expected.method);
     EXPECT_EQ(info.quality, expected.quality);
@@ -504,6 +508,11 @@ TEST(Format, NamesTheFirstOffence) {
         {128, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 128},  // infinite diagonal
         {136, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 136},              // negative error
         {140, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 140},              // distance not a number
+        {152, {0, 0, 0, 0, 0, 0, 0, 0x80}, ErrorCode::bad_file, 152},     // a scale of 0
+        {160, {0, 0, 0, 0, 0, 0, 0xf8, 0x7f}, ErrorCode::bad_file, 160},  // a scale that is no number
+        {184, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 184},  // an infinite mesh origin
+        {192, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, 192},              // an infinite weld
+        {196, {1}, ErrorCode::bad_file, 196},                             // reserved
         {kTable, {1}, ErrorCode::bad_file, kTable},                       // first block of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
@@ -515,7 +524,7 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
         {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
-        {kBlocks - 60, {1}, ErrorCode::bad_file, kBlocks - 60},                 // padding
+        {kBlocks - 4, {1}, ErrorCode::bad_file, kBlocks - 4},                   // padding
         {kBlocks - 1, {1}, ErrorCode::bad_file, kBlocks - 1},
         {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},     // first child
         {counts, {4}, ErrorCode::bad_file, counts},                   // more children than the degree

@@ -68,9 +68,12 @@ protected:
         return path;
     }
     Mesh load(const std::string& path) const {
-        std::string detail;
-        auto mesh = load_mesh(path.c_str(), &detail);
-        EXPECT_TRUE(mesh) << path << ": " << (mesh ? "" : mesh.error().what) << ' ' << detail;
+        ImportReport report;
+        return load(path, {}, report);
+    }
+    Mesh load(const std::string& path, const ImportOptions& options, ImportReport& report) const {
+        auto mesh = load_mesh(path.c_str(), options, &report);
+        EXPECT_TRUE(mesh) << path << ": " << (mesh ? "" : mesh.error().what) << ' ' << report.detail;
         return mesh ? std::move(*mesh) : Mesh{};
     }
     void expect_tetrahedron(const std::string& path) const {
@@ -86,12 +89,12 @@ protected:
                 << path << ": coordinates stay as the file has them";
     }
     void expect_refused(const std::string& path, ErrorCode code, const std::string& words) const {
-        std::string detail;
-        const auto mesh = load_mesh(path.c_str(), &detail);
+        ImportReport report;
+        const auto mesh = load_mesh(path.c_str(), {}, &report);
         ASSERT_FALSE(mesh) << path;
         EXPECT_EQ(mesh.error().code, code) << path << ": " << mesh.error().what;
-        EXPECT_NE((mesh.error().what + (" " + detail)).find(words), std::string::npos)
-            << path << ": " << mesh.error().what << " / " << detail;
+        EXPECT_NE((mesh.error().what + (" " + report.detail)).find(words), std::string::npos)
+            << path << ": " << mesh.error().what << " / " << report.detail;
     }
 
     fs::path folder_;
@@ -212,12 +215,13 @@ TEST_F(Import, RefusesWhatAssimpWouldBend) {
 }
 
 TEST_F(Import, RefusesWhatIsNoFile) {
-    std::string detail = "old";
-    auto mesh = load_mesh((folder_ / "missing.obj").c_str(), &detail);
+    ImportReport report{"old", {"old"}};
+    auto mesh = load_mesh((folder_ / "missing.obj").c_str(), {}, &report);
     ASSERT_FALSE(mesh);
     EXPECT_EQ(mesh.error().code, ErrorCode::io);
     EXPECT_EQ(mesh.error().where, static_cast<uint64_t>(ENOENT));
-    EXPECT_EQ(detail, "");
+    EXPECT_EQ(report.detail, "");
+    EXPECT_TRUE(report.notes.empty());
     fs::create_directory(folder_ / "folder.obj");
     mesh = load_mesh((folder_ / "folder.obj").c_str());
     ASSERT_FALSE(mesh);
@@ -318,9 +322,9 @@ TEST_F(Import, GltfWithAShortBufferIsRefused) {
 // Real files, where installed (Debian package glmark2-data).
 void expect_model(const char* path, size_t triangles, uint32_t open_edges) {
     if (!fs::exists(path)) GTEST_SKIP() << path << " is not installed (Debian package glmark2-data)";
-    std::string detail;
-    const auto mesh = load_mesh(path, &detail);
-    ASSERT_TRUE(mesh) << mesh.error().what << ' ' << detail;
+    ImportReport report;
+    const auto mesh = load_mesh(path, {}, &report);
+    ASSERT_TRUE(mesh) << mesh.error().what << ' ' << report.detail;
     EXPECT_EQ(mesh->triangles.size(), triangles);
     const auto cleaned = clean(mesh->view());
     ASSERT_TRUE(cleaned);

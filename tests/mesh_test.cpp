@@ -87,7 +87,7 @@ TEST(Clean, NegativeZeroIsZeroAndNearIsNotEqual) {
     for (const Vec3& v : cleaned->mesh.vertices) EXPECT_FALSE(std::signbit(v.y));
 
     mesh.vertices[0].x = std::numeric_limits<float>::denorm_min();
-    cleaned = clean(mesh.view());
+    cleaned = clean(mesh.view(), 0);
     ASSERT_TRUE(cleaned);
     EXPECT_FALSE(cleaned->report.closed);
     EXPECT_EQ(cleaned->mesh.vertices.size(), 5u);

@@ -25,6 +25,7 @@ struct BuildOptions {
     float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
     float beta = 0.5f;                          ///< weight of E_vol, >= 0; alpha + beta > 0
     uint64_t seed = 1;                          ///< of all that is drawn at random
+    float weld = kDefaultWeld;                  ///< tolerance for vertices that nearly meet, metres: see clean()
     bool exact = false;                         ///< make an exact tree (tree.hpp)
     uint32_t leaf_triangles = 4;                ///< triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
     uint32_t threads = 0;                       ///< 0 = all cores. The bytes do not depend on it.
@@ -81,8 +82,7 @@ inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kTh
 
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
-/// triangles is guaranteed, its inside only as far as the generalized winding number tells one. Meshes of less than
-/// 1e-24 or more than 1e22 m across are refused.
+/// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
 /// Fails with bad_options, unsupported, bad_mesh, cancelled, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 

@@ -69,6 +69,8 @@ struct BakeInfo {
     uint32_t ellipsoids = 0;   ///< asked leaves, 0 = not asked
     uint64_t seed = 0;         ///< of the surface sampling
     uint32_t resolution = 0;   ///< voxels along the longest side
+    Placement placement;       ///< of the mesh in the frame of its file: answers are relative to its origin
+    float weld = -1;           ///< asked tolerance for vertices that nearly meet, metres; below 0: the default
 };
 
 /// How close one level's cut is to the mesh, as measured on the decoded nodes when it was baked. NaN is unknown: ratios
