@@ -2,6 +2,7 @@
 // told apart by spheres around their roots, and a PairCache answers for bodies that have moved little.
 #include "query/descent.hpp"
 #include "query/enclosure.hpp"
+#include "query/limits.hpp"
 #include "query/order.hpp"
 
 #include <glm/geometric.hpp>
@@ -32,7 +33,8 @@ constexpr double kFirstSkin = 0x1p-8, kThinnestSkin = 0x1p-12, kThickestSkin = 0
 constexpr double kRoundDown = 1 - 0x1p-20; // more than the rounding of a float
 
 // No point of body B has moved farther than this, as body A sees it, metres; NaN if a pose is not finite.
-double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, const query::PlacedEllipsoid& root_b) {
+// `reach_b`: no point of B is farther from its origin.
+double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, double reach_b) {
     const query::RelativePose before = query::relative_pose(cache.pose_a, cache.pose_b);
     const query::RelativePose now = query::relative_pose(pose_a, pose_b);
     double turned = 0;
@@ -41,13 +43,13 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, co
         turned += glm::dot(column, column);
     }
     // Both placements are rounded, by less than kSeparationMargin of all lengths (separation.hpp).
-    return std::sqrt(turned) * root_b.reach + glm::length(now.translation - before.translation) +
-           query::kSeparationMargin * (2 * root_b.reach + before.distance + now.distance);
+    return std::sqrt(turned) * reach_b + glm::length(now.translation - before.translation) +
+           query::kSeparationMargin * (2 * reach_b + before.distance + now.distance);
 }
 
 // The bodies are certainly so far apart, by spheres around their roots; NaN if the pose is not finite.
 double gap_of_spheres(const TreeView& a, const TreeView& b, const query::RelativePose& b_to_a) {
-    const query::PlacedEllipsoid root_a = query::place(a.root()), root_b = query::place(b.root());
+    const query::PlacedEllipsoid root_a = query::place(a.bound(0)), root_b = query::place(b.bound(0));
     const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
     return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
            query::kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
@@ -86,13 +88,14 @@ CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeVi
 }
 
 CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                      QueryContext& context, const QueryOptions& options, PairCache* cache) noexcept {
+                      QueryContext& context, const QueryOptions& query_options, PairCache* cache) noexcept {
+    const QueryOptions options = query::sound(query_options);
     if (!usable(cache, a, b, options)) cache = nullptr;
     double moved = 0, smaller = 0;
     if (cache) {
-        const query::PlacedEllipsoid root_a = query::place(a.root()), root_b = query::place(b.root());
+        const query::PlacedEllipsoid root_a = query::place(a.bound(0)), root_b = query::place(b.bound(0));
         smaller = std::min(root_a.size, root_b.size);
-        if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b);
+        if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b.reach);
         if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)
             return {Verdict::separated, false, {}, {}};
     }

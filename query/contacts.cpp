@@ -8,9 +8,6 @@
 // of which another one resolves are dropped. The second time for the points: of each pair along the normal of the first
 // patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
 //
-// Bodies are taken in an order that depends on their trees alone, if these differ: poses change from step to step, and
-// what follows from the order should not.
-//
 // Complexity: twice collide_all()'s, and some microseconds for each pair that meets; for each patch up to 18 climbs and
 // rays.
 #include "query/climb.hpp"
@@ -494,8 +491,7 @@ ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactMan
 
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options) noexcept {
-    const bool different = query::before(a, b) || query::before(b, a);
-    const bool swap = different ? query::before(b, a) : query::must_swap(a, pose_a, b, pose_b);
+    const bool swap = query::must_swap(a, pose_a, b, pose_b);
     query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
                                   : query::Descent(a, pose_a, b, pose_b, context, options);
     return query::run(descent, swap ? pose_b : pose_a, swap, manifolds, context);

@@ -21,6 +21,8 @@ struct Body {
     uint32_t deepest = 0; ///< largest slot that was tested
 
     uint32_t deepest_level() const noexcept { return tree.level_of(deepest); }
+    /// The block that holds a slot, as queries take it.
+    const std::byte* block(uint32_t slot) const noexcept { return tree.bounding_block(slot / kBlockLanes); }
 };
 
 Body body(const TreeView& tree, uint32_t max_level) noexcept;
@@ -29,7 +31,7 @@ struct Descent {
     Body a, b;
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
-    const QueryOptions& options;
+    const QueryOptions options; // sound
     QueryContext::Entry* const stack;
     QueryStats stats;
 

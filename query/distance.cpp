@@ -72,16 +72,19 @@ private:
     // One of the bodies, as that whose children are tested.
     struct Side {
         Side(const Body& body, const LatticePose& other_to_here)
-            : blocks(body.tree.block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
+            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
               limit_from(body.limit_from), pose(other_to_here), step(power_of_two(step_exponent)),
               per_step(power_of_two(-step_exponent)) {
             if (body.tree.has_triangles()) triangles = body.tree.triangle_bytes(), hulls = body.tree.hull(0);
             triangle_bytes = static_cast<uint32_t>(3 * index_bytes(body.tree.vertex_count()));
             std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);
         }
-        const std::byte* block(uint32_t slot) const { return blocks + size_t{slot / kBlockLanes} * kBlockBytes; }
+        // As queries take it: bounding blocks above the last level.
+        const std::byte* block(uint32_t slot) const {
+            return (slot < leaves_from ? bounding_blocks : blocks) + size_t{slot / kBlockLanes} * kBlockBytes;
+        }
 
-        const std::byte* blocks;
+        const std::byte *blocks, *bounding_blocks;
         int32_t step_exponent;
         uint32_t leaves_from, limit_from, deepest = 0;
         const std::byte* triangles = nullptr;
@@ -98,10 +101,16 @@ private:
         if (budget() < 1) return;
         q_.open = DistanceSearch::kInfinity;
         Entry e;
-        if (!roots(e)) return done(true);
+        const bool near = roots(e);
+        if (!(base_ > 0)) { // they may meet
+            q_.enclosure = look_inside(q_.a.tree, q_.b.tree, q_.b_to_a, q_.stats, q_.options.max_pair_tests);
+            if (q_.enclosure == Verdict::undecided) return stop_at(e);
+            if (q_.enclosure == Verdict::overlapping) q_.upper = 0; // only surfaces that meet are of interest now
+        }
+        if (!near) return done(true);
         for (bool descending = true;;) {
             if ((e.flags & kLeaves) == kLeaves) {
-                q_.decide(e.node_a, e.node_b);
+                if (!q_.decide(e.node_a, e.node_b, bound_of(e))) return stop_at(e);
                 if (q_.overlapping) return;
                 descending = false;
             } else if (too_deep(e) && !descending) {
@@ -130,7 +139,7 @@ private:
         }
     }
 
-    uint64_t budget() const { return q_.options.max_pair_tests - q_.stats.pair_tests; }
+    uint64_t budget() const { return q_.left(); }
     double bound_of(const Entry& e) const { return base_ + double{e.bound}; }
     bool too_deep(const Entry& e) const {
         return (e.flags & kOpenB) != 0 ? e.node_b >= sides_[1].limit_from : e.node_a >= sides_[0].limit_from;
@@ -161,7 +170,6 @@ private:
         ++q_.stats.pair_tests, ++q_.stats.block_tests;
         const double bound = bounds.lower[0] * sides_[1].step;
         base_ = std::isfinite(bound) ? std::max(bound, 0.0) : root_bound(q_);
-        q_.roots_meet = !(base_ > 0);
         const bool open_b = leaf(q_.b) == 0 && (leaf(q_.a) != 0 || bounds.size[0] > one.single.size);
         e = {0, 0, 0, (open_b ? kOpenB : 0) | leaf(q_.a) * kLeafA | leaf(q_.b) * kLeafB};
         return !skips(base_);
@@ -269,13 +277,13 @@ private:
         while (size > 0 && !q_.overlapping) {
             const Entry e = stack[--size];
             if (skips(bound_of(e))) continue;
-            if ((e.flags & kLeaves) == kLeaves) {
-                q_.decide(e.node_a, e.node_b);
-            } else if (too_deep(e) || !(within = within && open(e))) {
+            const bool leaves = (e.flags & kLeaves) == kLeaves;
+            if (leaves || !too_deep(e))
+                within = within && (leaves ? q_.decide(e.node_a, e.node_b, bound_of(e)) : open(e));
+            if (!within || (!leaves && too_deep(e)))
                 q_.open = std::min(q_.open, bound_of(e));
-            } else {
+            else if (!leaves)
                 push();
-            }
         }
         return within;
     }
@@ -321,20 +329,16 @@ MeetingPair swapped(const MeetingPair& pair) {
 DistanceResult run(query::DistanceSearch& q, const Pose& pose_a, const MeetingPair* first) {
     DistanceResult out;
     if (!std::isfinite(q.b_to_a.distance)) return out;
-    if (first != nullptr) q.try_first(*first);
+    // If the budget does not hold even what an earlier query found, it is spent: another way to go on would end
+    // elsewhere.
+    if (first != nullptr && !q.try_first(*first)) return out;
     if (!q.overlapping) query::search(q);
-    out.pair = q.witness;
-    out.lower = q.overlapping ? 0 : q.lower();
-    out.upper = q.upper;
-    if (q.overlapping) {
-        out.verdict = Verdict::overlapping;
-    } else if (out.lower > 0 || q.complete) {
-        out.verdict = out.lower > 0 ? Verdict::separated : Verdict::undecided;
-    }
-    if (out.verdict == Verdict::separated && q.roots_meet) {
-        out.verdict = query::look_inside(q.a.tree, q.b.tree, q.b_to_a, q.stats, q.options.max_pair_tests);
-        if (out.verdict != Verdict::separated) out.lower = 0;
-        if (out.verdict == Verdict::overlapping) out.enclosed = true, out.upper = 0, out.pair = {};
+    out.pair = q.witness, out.upper = q.upper;
+    if (q.overlapping || q.enclosure == Verdict::overlapping) {
+        out.verdict = Verdict::overlapping, out.enclosed = !q.overlapping;
+    } else if (q.enclosure == Verdict::separated) {
+        out.lower = q.lower();
+        if (out.lower > 0) out.verdict = Verdict::separated;
     }
     q.stats.deepest_level = std::max(q.a.deepest_level(), q.b.deepest_level());
     out.stats = q.stats;

@@ -20,13 +20,15 @@ struct DistanceSearch {
     Body a, b;
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
-    const DistanceOptions& options;
+    const DistanceOptions options; // sound
     QueryContext::Entry* const entries;
     QueryStats stats;
 
-    bool roots_meet = true;   ///< they may
     bool complete = false;    ///< no budget ran out
     bool overlapping = false; ///< the witness meets
+    /// Does one body hold a part of the other? Settled before the search, so that no budget that settles more of that
+    /// leaves too little for this.
+    Verdict enclosure = Verdict::separated;
     /// Of all pairs of leaves: those decided are not nearer than `decided`, those ruled out than `skipped`, and those
     /// still open, when a limit ended the search, than `open`.
     double decided = kInfinity, skipped = kInfinity, open = kInfinity;
@@ -43,20 +45,25 @@ struct DistanceSearch {
     /// What is at least so far apart, > 0, need not be looked at: it cannot improve the answer by more than the
     /// tolerance, nor meet.
     double enough() const {
-        const double improving = upper - std::max(options.tolerance_absolute, relative_tolerance() * upper);
-        const double limit = std::min(options.max_distance, improving); // improving may be NaN: inf - inf
-        return std::max(upper < kInfinity ? limit : options.max_distance, std::numeric_limits<double>::min());
+        const double improving = upper < kInfinity ? upper - tolerance(upper) : kInfinity;
+        return std::max(std::min(options.max_distance, improving), std::numeric_limits<double>::min());
     }
-    double relative_tolerance() const { return std::max(options.tolerance_relative, kLeastTolerance); }
+    /// What bounds around this distance may be apart.
+    double tolerance(double distance) const {
+        return std::max(options.tolerance_absolute, options.tolerance_relative * distance);
+    }
+    /// Tests left of the budget.
+    uint64_t left() const { return options.max_pair_tests - std::min(options.max_pair_tests, stats.tests()); }
     double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
 
-    /// Decides on two leaves. Sets `overlapping` if they meet.
-    void decide(uint32_t node_a, uint32_t node_b) noexcept;
+    /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing done,
+    /// if the budget may not suffice.
+    bool decide(uint32_t node_a, uint32_t node_b, double bound) noexcept;
     /// The same for what an earlier query found, which is not trusted to be of these trees.
-    void try_first(const MeetingPair& pair) noexcept;
+    bool try_first(const MeetingPair& pair) noexcept;
 
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    static constexpr double kLeastTolerance = 1e-12;
+    static constexpr double kLeastTolerance = 1e-12, kMostTolerance = 1;
 
 private:
     // How far the corners of leaves reach along `normal`, or B's against it: few leaves are asked for often.
@@ -69,8 +76,10 @@ private:
     double corners_reach_; // share of S (triangle.hpp) of all corners
 
     double gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
-    void take(const TriangleDistance& found, const MeetingPair& pair, bool meet) noexcept;
-    void decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
+    void take(const TriangleDistance& found, const MeetingPair& pair, double bound, bool meet) noexcept;
+    void decide_ellipsoids(uint32_t node_a, uint32_t node_b, double bound) noexcept;
+    void decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,
+                          double bound) noexcept;
 };
 
 /// Bound on the distance of the roots, from spheres around them, in double precision.

@@ -19,6 +19,8 @@ constexpr double kLargestStep = 1.8; // in logarithms of rho and sigma
 constexpr double kSmallestLimit = 0.05;
 constexpr double kDeep = 0.7; // scaled by this about their centers, the bodies would still touch
 constexpr double kSmallestStep = 0x1p-50;
+// Distances are found to this share of the lengths that enter, before they are compared with a margin.
+constexpr double kDistanceTolerance = 1e-9;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 dvec3 unit(const dvec3& v) { // without overflow or underflow; NaN for 0
@@ -275,6 +277,12 @@ Gap distance_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double toler
     Search search(a, b);
     search.climb(tolerance, start_normal);
     return search.out_;
+}
+
+bool apart(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin) noexcept {
+    if (margin != 0) return distance_of(a, b, kDistanceTolerance * (margin + a.size + b.size)).lower > margin;
+    const PairVerdict verdict = test_pair(a, b).verdict;
+    return verdict == PairVerdict::separated || (verdict == PairVerdict::unresolved && distance_of(a, b, 0).lower > 0);
 }
 
 Gap depth_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double tolerance, const dvec3& start_normal) noexcept {

@@ -2,6 +2,7 @@
 #include "query/corners.hpp"
 #include "query/descent.hpp"
 #include "query/gap.hpp"
+#include "query/limits.hpp"
 #include "query/triangle.hpp"
 #include "query/triangle_ellipsoid.hpp"
 #include "query/triangle_lanes.hpp"
@@ -13,9 +14,6 @@ namespace {
 
 // Skins below this share of the first one are given up: nearly touching bodies gain nothing from them.
 constexpr float kLeastSkin = 0x1p-6f;
-
-// Distances of ellipsoids are found to this share of the lengths that enter, before they are compared with a margin.
-constexpr double kDistanceTolerance = 1e-9;
 
 } // namespace
 
@@ -29,7 +27,7 @@ Descent::Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativeP
                  const QueryOptions& query_options) noexcept
     : a(body(tree_a, query_options.max_level)), b(body(tree_b, query_options.max_level)), b_to_a(pose_b_to_a),
       lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
-      lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(query_options),
+      lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(query_options)),
       stack(context.entries) {}
 
 void Descent::set_skin(float distance) noexcept {
@@ -119,8 +117,7 @@ bool Descent::meets(const MeetingPair& pair) noexcept {
         if (in_a) return triangle_apart(place(a.tree, pair.triangle_a), place(b.tree.ellipsoid(pair.node_b), b_to_a));
         if (in_b) return triangle_apart(place(b.tree, pair.triangle_b, b_to_a), place(a.tree.ellipsoid(pair.node_a)));
         const auto x = place(a.tree.ellipsoid(pair.node_a)), y = place(b.tree.ellipsoid(pair.node_b), b_to_a);
-        if (distance == 0) return test_pair(x, y).verdict == PairVerdict::separated;
-        return distance_of(x, y, kDistanceTolerance * (distance + x.size + y.size)).lower > distance;
+        return apart(x, y, distance);
     });
 }
 

@@ -92,7 +92,7 @@ dmat3 MovingBody::rotation(double t) const noexcept {
 }
 
 PairMotion::PairMotion(const Motion& a, const Motion& b) noexcept
-    : a_(a), b_(b), between_(to_double(b.start.translation) - to_double(a.start.translation)),
+    : a_(a), b_(b), start_(relative_pose(a.start, b.start)), between_(to_double(b.start.translation) - to_double(a.start.translation)),
       lengths_(glm::length(between_) + 2 * (glm::length(a_.center()) + glm::length(b_.center())) +
                glm::length(a_.linear()) + glm::length(b_.linear())) {}
 
@@ -107,6 +107,7 @@ Instant PairMotion::at(double t) const noexcept {
     out.center_b = to_a * (between_ + (b_.center_at(t) - a_.center_at(t))) + a_.center();
     out.b_to_a.translation = out.center_b - out.b_to_a.rotation * b_.center();
     out.b_to_a.distance = lengths_;
+    if (t == 0) out.b_to_a = start_;
     out.velocity = to_a * (b_.linear() - a_.linear());
     out.spin_b = out.b_to_a.rotation * b_.spin();
     out.slack = 0x1p-44 * (1 + t * (a_.speed() + b_.speed()) / 16);

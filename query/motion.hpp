@@ -66,6 +66,7 @@ struct Instant {
 class PairMotion {
 public:
     PairMotion(const Motion& a, const Motion& b) noexcept;
+    /// At the start, the pose is that of the queries that know no motion, to the bit.
     Instant at(double t) const noexcept;
     const MovingBody& a() const noexcept { return a_; }
     const MovingBody& b() const noexcept { return b_; }
@@ -73,6 +74,7 @@ public:
 
 private:
     MovingBody a_, b_;
+    RelativePose start_;
     glm::dvec3 between_; ///< the starting translation of B less that of A
     double lengths_;
 };

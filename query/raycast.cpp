@@ -4,9 +4,9 @@
 // on a stack, the nearest on top, and are skipped when the best hit so far lies before their bound. Leaves are decided
 // in double precision (ray.hpp).
 //
-// Sound because a node covers the parts of all its children: where the ray misses the node, it misses these parts. To
-// meet the children themselves (raycast_cut), nodes are grown until they hold all below them; their boxes are not, and
-// are passed over.
+// Sound because a node's bounding volume holds all leaves below it: where the ray misses the node, it misses these. To
+// meet the ellipsoids of a cut, also of an exact tree (raycast_cut), the nodes' own are grown until they hold all below
+// them; their boxes are not, and are passed over.
 //
 // Complexity: one block test for each node that is opened.
 #undef HWY_TARGET_INCLUDE
@@ -17,6 +17,7 @@
 
 #include "query/convert.hpp"
 #include "query/descent.hpp"
+#include "query/limits.hpp"
 #include "query/ray.hpp"
 #include "query/ray_lanes-inl.hpp"
 
@@ -61,7 +62,7 @@ struct Cast {
             if (found) still_open.length = best.t;
             return hit_within(double{options.margin}, still_open, leaf);
         };
-        if (triangles.count == 0 || growth) return take(hit_by(place(body.tree.ellipsoid(at))), kNoTriangle);
+        if (triangles.count == 0 || growth) return take(hit_by(place(growth ? body.tree.ellipsoid(at) : body.tree.bound(at))), kNoTriangle);
         bool taken = false;
         stats.triangle_tests += triangles.count;
         for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
@@ -116,7 +117,7 @@ private:
         c_.body.deepest = std::max(c_.body.deepest, first + count - 1);
         const LaneTag d;
         alignas(32) float entries[kBlockLanes];
-        const std::byte* const block = c_.body.tree.block(first / kBlockLanes);
+        const std::byte* const block = kGrown ? c_.body.tree.block(first / kBlockLanes) : c_.body.block(first);
         const int32_t step_exponent = c_.body.lattice.step_exponent;
         const Lanes limit = hn::Set(d, limit_);
         if constexpr (kGrown) {
@@ -199,11 +200,12 @@ namespace {
 using query::to_double, query::to_float;
 
 RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
-                   const QueryOptions& options, bool any, const float* growth = nullptr) {
+                   const QueryOptions& query_options, bool any, const float* growth = nullptr) {
     using glm::dvec3;
+    const QueryOptions options = query::sound(query_options);
     RaycastResult out;
     const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
-    query::PlacedEllipsoid root = query::place(tree.root());
+    query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.bound(0));
     if (growth) root.size *= double{growth[0]}, root.reach *= double{growth[0]};
     const query::PlacedRay placed = query::place(ray, to_frame, root, options.margin);
     if (!placed.valid) return out;

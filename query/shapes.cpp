@@ -4,7 +4,8 @@
 // on top; leaves are decided in double precision (rounded_box.hpp). A closed exact tree whose triangles all are apart
 // from the shape holds it wholly or not at all: its center tells.
 //
-// Sound because a node covers the parts of all its children: if the shape is apart from the node, it is from these.
+// Sound because a node's bounding volume holds all leaves below it: if the shape is apart from the node, it is from
+// these.
 //
 // Complexity: one block test for each node that is opened.
 #undef HWY_TARGET_INCLUDE
@@ -15,6 +16,7 @@
 
 #include "query/descent.hpp"
 #include "query/inside.hpp"
+#include "query/limits.hpp"
 #include "query/rounded_box.hpp"
 #include "query/shape_lanes-inl.hpp"
 
@@ -99,7 +101,7 @@ private:
         if (count > left()) return false;
         stats.pair_tests += count, ++stats.block_tests;
         q_.body.deepest = std::max(q_.body.deepest, first + count - 1);
-        const std::byte* const block = q_.body.tree.block(first / kBlockLanes);
+        const std::byte* const block = q_.body.block(first);
         uint32_t meet = boxes_meet_shape(block, q_.lanes) & ((1u << count) - 1);
         if (meet == 0) return true;
         const LaneTag d;
@@ -192,19 +194,23 @@ OverlapResult overlap_with(const TreeView& tree, const PlacedHalfSpace& shape, Q
 namespace prolate {
 
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(sphere, pose, options.margin), context, options);
 }
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(capsule, pose, options.margin), context, options);
 }
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Box& box, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(box, pose, options.margin), context, options);
 }
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
-                      const QueryOptions& options) noexcept {
+                      const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
     return query::overlap_with(tree, query::place(half_space, pose, options.margin), context, options);
 }
 

@@ -17,8 +17,7 @@
 // ends. It ends earlier with a smaller budget, but does the same until then, and the earliest time of all pairs never
 // falls.
 //
-// A closed solid that holds a part of the other at the start is found last of all, if no surfaces meet then; later
-// they must meet before.
+// Whether a closed solid holds a part of the other at the start is settled first; later, surfaces must meet before.
 //
 // Memory: as in distance.cpp. When the heap is full, pairs are searched depth first, up to the earliest meeting found,
 // until there is room.
@@ -83,8 +82,11 @@ public:
     void run() {
         q_.open = 0;
         if (budget() < 1) return;
-        q_.open = 1;
         Entry e = roots();
+        if (q_.enclosure == Verdict::undecided) return;
+        q_.open = 1;
+        if (q_.enclosure == Verdict::overlapping) // only surfaces that meet now are of interest
+            q_.horizon = std::numeric_limits<double>::min();
         for (;;) {
             if (!(time_of(e) < q_.horizon)) break; // and so are all others
             if (!look_at(e)) return stop_at(time_of(e));
@@ -109,7 +111,7 @@ public:
     }
 
 private:
-    uint64_t budget() const { return q_.options.max_pair_tests - q_.stats.pair_tests; }
+    uint64_t budget() const { return q_.left(); }
     void stop_at(double time) { q_.open = std::min(q_.open, time); }
 
     bool too_deep(const Entry& e) const {
@@ -123,7 +125,8 @@ private:
         Times times;
         q_.move_to(0);
         test<true>(0, 0, 0, 1, times);
-        q_.roots_meet = !(times.gap[0] > 0);
+        if (!(times.gap[0] > 0))
+            q_.enclosure = look_inside(q_.a.tree, q_.b.tree, q_.now.b_to_a, q_.stats, q_.options.max_pair_tests);
         const bool open_b = leaf(q_.b) == 0 && (leaf(q_.a) != 0 || times.bounds.size[0] > times.one_size);
         return entry(0, 0, times.time[0], (open_b ? kOpenB : 0) | leaves);
     }
@@ -137,6 +140,7 @@ private:
         const bool leaves = (e.flags & kLeaves) == kLeaves;
         double until = q_.time;
         if (leaves || too_deep(e)) {
+            if (q_.triangle_tests(e.node_a, e.node_b, !leaves) >= budget()) return false;
             ++q_.stats.pair_tests;
             until = q_.advance(e.node_a, e.node_b, !leaves);
         } else {
@@ -166,9 +170,9 @@ private:
         Body& body = kB ? q_.b : q_.a;
         const Body& other = kB ? q_.a : q_.b;
         const MotionFrame& frame = kB ? q_.frame_b : q_.frame_a;
-        const std::byte* const block = body.tree.block(first / kBlockLanes);
+        const std::byte* const block = body.block(first);
         const int32_t exponent = body.lattice.step_exponent;
-        const Single one = place_here(other.tree.block(node / kBlockLanes), node % kBlockLanes, frame.y_to_x);
+        const Single one = place_here(other.block(node), node % kBlockLanes, frame.y_to_x);
         LaneSpeeds speeds;
         bound_lanes(block, exponent, one, out.bounds);
         speed_lanes(block, exponent, one, frame, out.bounds, speeds);
@@ -196,7 +200,7 @@ private:
             const uint32_t first = children.first + i, count = std::min(children.count - i, kBlockLanes);
             Times times;
             test<kB>(first, node, 0, count, times);
-            const std::byte* const counts = body.tree.block(first / kBlockLanes) + kBlockCount;
+            const std::byte* const counts = body.block(first) + kBlockCount;
             for (uint32_t lane = 0; lane < count; ++lane) {
                 if (times.time[lane] >= q_.horizon) continue;
                 const auto stored = static_cast<uint8_t>(counts[lane]);
@@ -278,12 +282,7 @@ SweepResult run(query::SweepSearch& q, const Motion& motion_a) {
     query::search(q);
     out.time_lower = q.complete ? q.horizon : std::min(q.open, q.horizon);
     if (q.complete) out.verdict = q.found ? Verdict::overlapping : Verdict::separated;
-    if (q.roots_meet && out.time_lower > 0) {
-        q.move_to(0);
-        const Verdict inside = query::look_inside(q.a.tree, q.b.tree, q.now.b_to_a, q.stats, q.options.max_pair_tests);
-        if (inside != Verdict::separated) out.verdict = inside, out.time_lower = 0;
-        if (inside == Verdict::overlapping) out.enclosed = true;
-    }
+    if (q.enclosure == Verdict::overlapping) out.verdict = Verdict::overlapping, out.enclosed = !q.found, out.time_lower = 0;
     q.stats.deepest_level = std::max(q.a.deepest_level(), q.b.deepest_level());
     out.stats = q.stats;
     if (out.enclosed) {

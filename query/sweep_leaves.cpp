@@ -10,6 +10,7 @@
 //
 // n is the direction from one closest point to the other; an inexact one costs steps only.
 #include "query/gap.hpp"
+#include "query/limits.hpp"
 #include "query/sweep_search.hpp"
 #include "query/triangle_ellipsoid.hpp"
 
@@ -79,7 +80,7 @@ Nearest nearest(const TrianglePiece& x, const TrianglePiece& y, const dvec3&, do
 }
 Nearest nearest(const TrianglePiece& x, const EllipsoidPiece& y, const dvec3&, double) {
     const TriangleDistance d = distance(x.placed, y.placed);
-    return nearest(d, !(d.lower > 0) && !apart(x.placed, y.placed));
+    return nearest(d, !apart(x.placed, y.placed));
 }
 Nearest nearest(const EllipsoidPiece& x, const TrianglePiece& y, const dvec3& n, double tolerance) {
     Nearest out = nearest(y, x, n, tolerance);
@@ -88,8 +89,7 @@ Nearest nearest(const EllipsoidPiece& x, const TrianglePiece& y, const dvec3& n,
 }
 Nearest nearest(const EllipsoidPiece& x, const EllipsoidPiece& y, const dvec3& n, double tolerance) {
     const Gap gap = distance_of(x.placed, y.placed, tolerance, n);
-    const bool meet = !(gap.lower > 0) && test_pair(x.placed, y.placed).verdict != PairVerdict::separated;
-    return {std::max(gap.upper, 0.0), meet, gap.point_a, gap.point_b, gap.normal};
+    return {std::max(gap.upper, 0.0), !apart(x.placed, y.placed), gap.point_a, gap.point_b, gap.normal};
 }
 
 void store(const dvec3& v, float (&out)[3]) {
@@ -101,6 +101,11 @@ dvec3 on_lattice(const dvec3& metres, const LatticeInfo& lattice) {
 }
 float length_up(const dvec3& v) {
     return static_cast<float>(glm::length(v) * (1 + 0x1p-20));
+}
+
+SweepOptions sound(SweepOptions options) {
+    options.margin = sound_length(options.margin), options.tolerance = sound_tolerance(options.tolerance);
+    return options;
 }
 
 // All in X's frame, metres.
@@ -121,7 +126,7 @@ MotionFrame frame(const LatticePose& y_to_x, const LatticeInfo& lattice, const d
 SweepSearch::SweepSearch(const TreeView& tree_a, const Motion& motion_a, const TreeView& tree_b, const Motion& motion_b,
                          QueryContext& context, const SweepOptions& sweep_options) noexcept
     : a(body(tree_a, sweep_options.max_level)), b(body(tree_b, sweep_options.max_level)), motion(motion_a, motion_b),
-      options(sweep_options), entries(context.entries) {
+      options(sound(sweep_options)), entries(context.entries) {
     move_to(0);
     const PlacedEllipsoid x = place(a.tree.root()), y = place(b.tree.root(), now.b_to_a);
     const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);
@@ -200,12 +205,18 @@ bool SweepSearch::advance_pair(const X& x, const Y& y, const MeetingPair& pair, 
     return false;
 }
 
+uint64_t SweepSearch::triangle_tests(uint32_t node_a, uint32_t node_b, bool as_covers) const noexcept {
+    const uint32_t in_a = as_covers ? 0 : a.tree.triangles(node_a).count;
+    const uint32_t in_b = as_covers ? 0 : b.tree.triangles(node_b).count;
+    return in_a + in_b == 0 ? 0 : uint64_t{std::max(in_a, 1u)} * std::max(in_b, 1u);
+}
+
 double SweepSearch::advance(uint32_t node_a, uint32_t node_b, bool as_covers) noexcept {
     const TriangleRange in_a = as_covers ? TriangleRange{} : a.tree.triangles(node_a),
                         in_b = as_covers ? TriangleRange{} : b.tree.triangles(node_b);
     const dvec3 center_a = motion.a().center(), center_b = now.center_b;
-    const auto ellipsoid_a = [&] { return EllipsoidPiece(place(a.tree.ellipsoid(node_a)), center_a); };
-    const auto ellipsoid_b = [&] { return EllipsoidPiece(place(b.tree.ellipsoid(node_b), now.b_to_a), center_b); };
+    const auto ellipsoid_a = [&] { return EllipsoidPiece(place(a.tree.bound(node_a)), center_a); };
+    const auto ellipsoid_b = [&] { return EllipsoidPiece(place(b.tree.bound(node_b), now.b_to_a), center_b); };
     double least = horizon - time;
     dvec3 n(0);
     if (in_a.count == 0 && in_b.count == 0) {

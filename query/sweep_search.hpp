@@ -9,6 +9,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 
@@ -30,7 +31,7 @@ inline constexpr double kLeastStep = 0x1p-46;
 struct SweepSearch {
     Body a, b;
     const PairMotion motion;
-    const SweepOptions& options;
+    const SweepOptions options; // sound
     QueryContext::Entry* const entries;
     QueryStats stats;
 
@@ -42,7 +43,8 @@ struct SweepSearch {
     Instant now{};
     MotionFrame frame_a{}, frame_b{};
 
-    bool roots_meet = true; ///< at the start they may
+    /// At the start, does one body hold a part of the other? Settled before the search, as in distance_search.hpp.
+    Verdict enclosure = Verdict::separated;
     bool complete = false;  ///< no budget ran out
     double open = 1;        ///< what is left of the search keeps apart until then
     /// The earliest meeting found, or 1.
@@ -58,8 +60,13 @@ struct SweepSearch {
     void move_to(double t) noexcept;
 
     /// Time, not before the present one, until which two leaves keep apart, at most `horizon`. If they meet now, takes
-    /// the meeting and returns the present time. `as_covers`: the nodes' ellipsoids stand for what is in them.
+    /// the meeting and returns the present time. `as_covers`: what covers the nodes stands for what is
+    /// below them.
     double advance(uint32_t node_a, uint32_t node_b, bool as_covers) noexcept;
+    /// Tests of triangles that advance() takes, at most.
+    uint64_t triangle_tests(uint32_t node_a, uint32_t node_b, bool as_covers) const noexcept;
+    /// Tests left of the budget.
+    uint64_t left() const { return options.max_pair_tests - std::min(options.max_pair_tests, stats.tests()); }
 
 private:
     template <class X, class Y>

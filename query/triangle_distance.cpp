@@ -13,6 +13,8 @@ using glm::dvec3;
 
 // A lower bound this near to the upper one cannot be improved by more than rounding.
 constexpr double kTight = 1 - 0x1p-40;
+// A lower bound of so many times the margin is beyond doubt: triangles that are farther apart are found to be.
+constexpr double kDoubtful = 32;
 
 // The point of a triangle below or above x, if there is one: from the areas of the triangles that x makes with its
 // edges.
@@ -102,7 +104,11 @@ TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, doub
     const TrianglePair pair(a, b);
     Search search(pair);
     search.run();
-    return search.result(margin * (a.reach + b.reach));
+    const double bound = margin * (a.reach + b.reach);
+    TriangleDistance out = search.result(bound);
+    if (!(out.lower > kDoubtful * bound)) // its directions are others than those of apart()
+        out.lower = apart(a, b, 0, margin) ? std::max(out.lower, std::numeric_limits<double>::min()) : 0;
+    return out;
 }
 
 double gap_along(const PlacedTriangle& a, const PlacedTriangle& b, const dvec3& n) noexcept {

@@ -25,7 +25,8 @@ struct TriangleDistance {
     double upper;          // nor farther; infinite if a pose was not finite
     glm::dvec3 on_a, on_b; // points of the triangles, in A's frame, `upper` apart but for rounding
 };
-/// The margin is a parameter only so that the tests can show that wrong ones are caught.
+/// With the same margin, `lower` is positive only if apart() of triangle.hpp holds, and always if it does. The margin is
+/// a parameter only so that the tests can show that wrong ones are caught.
 TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, double margin = kSeparationMargin) noexcept;
 /// A lower bound from one direction n, of length 1 but for rounding, pointing from A to B.
 double gap_along(const PlacedTriangle& a, const PlacedTriangle& b, const glm::dvec3& n) noexcept;

@@ -1,6 +1,7 @@
 // Writing .etree bytes (src/FORMAT.md).
 #include "src/format.hpp"
 
+#include "src/bounding.hpp"
 #include "src/bytes.hpp"
 #include "src/hash.hpp"
 #include "src/layout.hpp"
@@ -13,6 +14,7 @@
 #include <iterator>
 #include <new>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -63,7 +65,8 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         first_block.push_back(next);
     }
     first_block.pop_back(); // the last level has no children
-    const uint64_t blocks_end = end_of_blocks(level_count, first_block.back());
+    const uint64_t bounding_blocks = info.exact ? 0 : first_block[level_count - 1];
+    const uint64_t blocks_end = end_of_blocks(level_count, bounding_blocks + first_block.back());
     const auto vertex_count = static_cast<uint32_t>(triangles.vertices.size());
     const auto triangle_count = static_cast<uint32_t>(triangles.triangles.size());
     const uint64_t total =
@@ -112,15 +115,18 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
                       static_cast<size_t>(first_block.back()) * kHullBytes, triangles);
     }
 
+    std::optional<Bounding> bounding;
+    if (!info.exact) bounding.emplace(levels, lattice);
     uint32_t next_triangle = 0;
     std::vector<uint32_t> families{1}; // nodes of the level, by parents
     for (uint32_t l = 0; l < level_count; ++l) {
         const PackedLevel& level = levels[l];
         assert(std::accumulate(families.begin(), families.end(), size_t{0}) == level.nodes.size());
-        std::byte* const begin = h + end_of_blocks(level_count, first_block[l]);
+        std::byte* const begin = h + end_of_blocks(level_count, bounding_blocks + first_block[l]);
         uint64_t next_block = first_block[l + 1]; // of the children
         std::vector<uint32_t> next_families;
         std::byte* block = begin;
+        std::byte* bounding_block = h + end_of_blocks(level_count, first_block[l]);
         auto node = level.nodes.begin();
         for (const uint32_t siblings : families) {
             for (uint32_t i = 0; i < siblings; ++i, ++node) {
@@ -132,20 +138,34 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
                 next_block += blocks_for(node->child_count);
                 if (node->child_count) next_families.push_back(node->child_count);
             }
-            for (uint32_t i = 0; i < siblings; i += kBlockLanes, block += kBlockBytes)
-                store_boxes(block, {node - siblings + i, std::min(siblings - i, kBlockLanes)}, lattice);
+            for (uint32_t i = 0; i < siblings; i += kBlockLanes, block += kBlockBytes) {
+                const auto first = node - siblings + i;
+                const uint32_t count = std::min(siblings - i, kBlockLanes);
+                store_boxes(block, {first, count}, lattice);
+                if (!bounding || l + 1 == level_count) continue;
+                std::copy_n(block, kBlockBytes, bounding_block);
+                std::vector<PackedNode> nodes;
+                for (uint32_t lane = 0; lane < count; ++lane) {
+                    nodes.push_back(bounding->node(l, static_cast<size_t>(first - level.nodes.begin()) + lane));
+                    store_node(bounding_block, lane, nodes.back(),
+                               load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane));
+                }
+                store_boxes(bounding_block, nodes, lattice);
+                bounding_block += kBlockBytes;
+            }
         }
         families = std::move(next_families);
         std::byte* const row = h + kHeaderBytes + l * kLevelBytes;
         store_le(row + kLevelFirstBlock, static_cast<uint32_t>(first_block[l]));
         store_le(row + kLevelNodeCount, static_cast<uint32_t>(level.nodes.size()));
-        store_le(row + kLevelEndByte, end_of_blocks(level_count, first_block[l + 1]));
+        store_le(row + kLevelEndByte, end_of_blocks(level_count, bounding_blocks + first_block[l + 1]));
         store_le(row + kLevelHash, hash_bytes({begin, block}));
         store_le(row + kLevelUnionVolume, level.figures.union_volume);
         for (size_t i = 0; i < std::size(kFigures); ++i)
             store_le(row + kLevelFigures + sizeof(float) * i, static_cast<float>(level.figures.*kFigures[i]));
     }
     assert(next_triangle == triangle_count);
+    store_le(h + kHeaderBytes + kLevelHash, root_hash(bytes, level_count, bounding_blocks));
     store_le(h + kAtHeaderHash, header_hash({h, table_end(level_count)}));
     return bytes;
 }
@@ -154,7 +174,7 @@ void store_hulls(std::span<std::byte> file, std::span<const std::byte> hulls) {
     const uint32_t levels = load_le<uint16_t>(file.data() + kAtLevelCount);
     const auto begin = load_le<uint64_t>(file.data() + kHeaderBytes + (levels - 1) * kLevelBytes + kLevelEndByte);
     const std::span<std::byte> section = file.subspan(static_cast<size_t>(begin));
-    assert((begin - blocks_begin(levels)) / kBlockBytes * kHullBytes == hulls.size());
+    assert((begin - bounding_begin(levels)) / kBlockBytes * kHullBytes == hulls.size());
     std::copy(hulls.begin(), hulls.end(), section.begin());
     store_le(section.data() + hulls.size(), section_hash(section, hulls.size()));
 }

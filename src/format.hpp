@@ -81,7 +81,7 @@ struct PackedTriangles {
 };
 
 /// The bytes of a whole file; `triangles` are written if info.exact, with hull records that know nothing. Gives each
-/// family of siblings blocks of its own.
+/// family of siblings blocks of its own, and of a tree without triangles finds the bounding volumes of the inner nodes.
 /// The caller keeps the invariants of FORMAT.md (counts that add up, degree and level limits).
 std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
                               std::span<const PackedLevel> levels, const PackedTriangles& triangles = {});

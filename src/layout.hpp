@@ -75,20 +75,28 @@ inline constexpr double LevelFigures::*kFigures[] = {
 };
 static_assert(kLevelFigures + sizeof(float) * std::size(kFigures) == kLevelBytes);
 
-// The blocks follow the levels table, from the next multiple of their alignment on; zeros fill the gap.
+// Bounding blocks, then the blocks, follow the levels table, from the next multiple of their alignment on; zeros fill
+// the gap.
 constexpr size_t table_end(uint32_t level_count) {
     return kHeaderBytes + level_count * kLevelBytes;
 }
-constexpr size_t blocks_begin(uint32_t level_count) {
+constexpr size_t bounding_begin(uint32_t level_count) {
     return (table_end(level_count) + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
 }
 
 // Slots are 32 bits wide.
 inline constexpr uint64_t kMaxBlocks = UINT32_MAX / kBlockLanes;
 
-// In 64-bit arithmetic, also for a reader whose size_t has 32.
+// Of so many blocks, bounding blocks included; in 64-bit arithmetic, also for a reader whose size_t has 32.
 constexpr uint64_t end_of_blocks(uint32_t level_count, uint64_t blocks) {
-    return blocks_begin(level_count) + blocks * kBlockBytes;
+    return bounding_begin(level_count) + blocks * kBlockBytes;
+}
+
+// Hash of the first level's block and all bounding blocks.
+inline uint64_t root_hash(std::span<const std::byte> file, uint32_t level_count, uint64_t bounding_blocks) {
+    const auto bytes = static_cast<size_t>(bounding_blocks * kBlockBytes);
+    const auto bounding = file.subspan(bounding_begin(level_count), bytes);
+    return hash_bytes(file.subspan(bounding_begin(level_count) + bytes, kBlockBytes), hash_bytes(bounding));
 }
 
 // The triangle section of an exact tree, which follows the blocks: a hull record for each block, hash of all the rest,

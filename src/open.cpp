@@ -106,17 +106,20 @@ Result<void> check_header(std::span<const std::byte> bytes) {
 struct Levels {
     uint64_t nodes = 0, blocks = 0; // of the whole file
     uint32_t present = 0;           // levels that the bytes hold
+    uint64_t bounding_blocks = 0;
 };
 
 // The table: consecutive levels of whole blocks, and no block without a node.
-Result<Levels> check_levels(std::span<const std::byte> bytes, uint32_t level_count) {
+Result<Levels> check_levels(std::span<const std::byte> bytes, uint32_t level_count, bool exact) {
     const std::byte* const h = bytes.data();
     Levels out;
-    auto& [nodes, blocks, present] = out;
+    if (!exact) // as many as there are blocks before the last level
+        out.bounding_blocks = load_le<uint32_t>(h + kHeaderBytes + (level_count - 1) * kLevelBytes + kLevelFirstBlock);
+    auto& [nodes, blocks, present, bounding_blocks] = out;
     for (uint32_t l = 0; l < level_count; ++l) {
         const size_t at = kHeaderBytes + l * kLevelBytes;
         if (load_le<uint32_t>(h + at + kLevelFirstBlock) != blocks) return bad("levels are not consecutive", at);
-        const uint64_t begin = end_of_blocks(level_count, blocks), end = load_le<uint64_t>(h + at + kLevelEndByte);
+        const uint64_t begin = end_of_blocks(level_count, bounding_blocks + blocks), end = load_le<uint64_t>(h + at + kLevelEndByte);
         const uint64_t more = end > begin ? (end - begin) / kBlockBytes : 0;
         if (more == 0 || more > kMaxBlocks - blocks || end != begin + more * kBlockBytes || (l == 0 && more != 1))
             return bad("wrong byte count of a level", at + kLevelEndByte);
@@ -161,6 +164,24 @@ public:
         return count & kTriangleLeaf ? 0 : count;
     }
 
+    // The bounding block at `where` of block `b`, which has been found to be sound: the same nodes, and their ellipsoids
+    // and boxes are sound, too.
+    Result<void> bounding_block(uint32_t b, size_t where) const {
+        const std::byte *const from = file_ + where, *const nodes = file_ + at(b);
+        uint32_t lane = 0;
+        for (; lane < kBlockLanes && load_le<uint16_t>(nodes + block_offset(kBlockDiagonal, 0, lane)) != 0; ++lane) {
+            const size_t first = kBlockFirst + size_t{4} * lane;
+            if (from[kBlockCount + lane] != nodes[kBlockCount + lane] ||
+                load_le<uint32_t>(from + first) != load_le<uint32_t>(nodes + first))
+                return bad("a bounding block has other nodes than its block", where + first);
+            if (nodes[kBlockCount + lane] == std::byte{0} && !same_ellipsoid(from, nodes, lane))
+                return bad("a bounding block has another leaf than its block", where + block_offset(kBlockCenter, 0, lane));
+            if (const auto sound = shape(where, lane); !sound) return sound;
+        }
+        if (const auto sound = box_frame(where); !sound) return sound;
+        return lane < kBlockLanes ? no_nodes_from(where, lane) : Result<void>{};
+    }
+
     uint64_t children() const { return children_; } // of the level's nodes so far, and the blocks that they take
     uint64_t child_blocks() const { return next_child_block_ - level_end_; }
     uint64_t triangles() const { return next_triangle_; } // of all nodes so far
@@ -170,7 +191,7 @@ private:
 
     Result<void> node(size_t block, size_t lane) {
         const std::byte* const from = file_ + block;
-        const size_t at_count = kBlockCount + lane, at_first = kBlockFirst + 4 * lane, at_size = kBlockExponent + lane;
+        const size_t at_count = kBlockCount + lane, at_first = kBlockFirst + 4 * lane;
         const uint32_t count = load_le<uint8_t>(from + at_count);
         const bool has_triangles = (count & kTriangleLeaf) != 0;
         const uint32_t children = has_triangles ? 0 : count, triangles = has_triangles ? count - kTriangleLeaf : 0;
@@ -183,6 +204,13 @@ private:
         children_ += children;
         next_child_block_ += blocks_for(children);
         next_triangle_ += triangles;
+        return shape(block, lane);
+    }
+
+    // Size, ellipsoid and box of a node.
+    Result<void> shape(size_t block, size_t lane) const {
+        const std::byte* const from = file_ + block;
+        const size_t at_size = kBlockExponent + lane;
         const auto exponent = load_le<int8_t>(from + at_size);
         if (exponent < format::kMinNodeExponent || exponent > format::kMaxNodeExponent)
             return bad("node size out of range", block + at_size);
@@ -200,7 +228,7 @@ private:
         return {};
     }
 
-    Result<void> box_frame(size_t block) {
+    Result<void> box_frame(size_t block) const {
         const std::byte* const from = file_ + block;
         for (size_t i = 0; i < 3; ++i) {
             const int32_t origin = load_le<int32_t>(from + kBlockBoxOrigin + 4 * i);
@@ -211,6 +239,16 @@ private:
         }
         if (from[kBlockReserved] != std::byte{0}) return bad("reserved bytes are not zero", block + kBlockReserved);
         return {};
+    }
+
+    static bool same_ellipsoid(const std::byte* a, const std::byte* b, size_t lane) {
+        bool same = a[kBlockExponent + lane] == b[kBlockExponent + lane];
+        for (const size_t array : {kBlockCenter, kBlockDiagonal, kBlockOffDiagonal})
+            for (size_t i = 0; i < 3; ++i) {
+                const size_t at = block_offset(array, i, lane);
+                same = same && load_le<uint16_t>(a + at) == load_le<uint16_t>(b + at);
+            }
+        return same;
     }
 
     // The lanes of `block` from `lane` on are empty.
@@ -253,15 +291,15 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     if (options.check_hash && header_hash(bytes.first(table_bytes)) != load_le<uint64_t>(h + kAtHeaderHash))
         return bad("the header is damaged (hash mismatch)", kAtHeaderHash);
 
-    const auto levels = check_levels(bytes, level_count);
-    if (!levels) return levels.error();
-    const auto [nodes, blocks, present] = *levels;
-    if (load_le<uint32_t>(h + kAtNodeCount) != nodes) return bad("wrong node count", kAtNodeCount);
     const bool exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0;
+    const auto levels = check_levels(bytes, level_count, exact);
+    if (!levels) return levels.error();
+    const auto [nodes, blocks, present, bounding_blocks] = *levels;
+    if (load_le<uint32_t>(h + kAtNodeCount) != nodes) return bad("wrong node count", kAtNodeCount);
     const uint32_t vertex_count = load_le<uint32_t>(h + kAtVertexCount);
     const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
     const uint64_t total =
-        end_of_blocks(level_count, blocks) + (exact ? section_bytes(blocks, vertex_count, triangle_count) : 0);
+        end_of_blocks(level_count, bounding_blocks + blocks) + (exact ? section_bytes(blocks, vertex_count, triangle_count) : 0);
     if (load_le<uint64_t>(h + kAtTotalSize) != total) return bad("wrong total size", kAtTotalSize);
     if (present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
     const uint64_t present_end = load_le<uint64_t>(h + kHeaderBytes + (present - 1) * kLevelBytes + kLevelEndByte);
@@ -270,9 +308,10 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         return present == level_count ? bad("the file is cut off inside its triangles", bytes.size())
                                       : bad("the file is cut off inside a level", bytes.size());
 
-    const size_t first_block = blocks_begin(level_count);
-    if (const size_t at = first_nonzero(h, table_bytes, first_block); at < first_block)
+    const size_t bounding = bounding_begin(level_count);
+    if (const size_t at = first_nonzero(h, table_bytes, bounding); at < bounding)
         return bad("bytes between the levels table and the nodes are not zero", at);
+    const auto first_block = static_cast<size_t>(end_of_blocks(level_count, bounding_blocks));
 
     TreeView view;
     view.bytes_ = bytes;
@@ -288,8 +327,11 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         view.block_count_ += level.block_count;
         const size_t level_bytes = level.block_count * kBlockBytes;
         const size_t begin = static_cast<size_t>(level.end_byte) - level_bytes;
-        if (options.check_hash && hash_bytes(bytes.subspan(begin, level_bytes)) !=
-                                      load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
+        const auto hash = [&] {
+            return l > 0 ? hash_bytes(bytes.subspan(begin, level_bytes))
+                         : root_hash(bytes, level_count, bounding_blocks);
+        };
+        if (options.check_hash && hash() != load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
             return bad("the nodes of a level are damaged (hash mismatch)", begin);
         check.begin_level(view.block_count_);
         if (l == 0) {
@@ -308,6 +350,13 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     }
     view.level_count_ = present;
     view.root_ = view.ellipsoid(0);
+    if (!exact) {
+        view.bounding_blocks_ = h + bounding;
+        view.bounding_count_ = view.first_slot(present - 1) / kBlockLanes;
+        for (uint32_t b = 0; b < view.bounding_count_; ++b)
+            if (const auto sound = check.bounding_block(b, bounding + size_t{b} * kBlockBytes); !sound)
+                return sound.error();
+    }
     const uint64_t next_triangle = check.triangles();
     if (next_triangle > triangle_count || (present == level_count && next_triangle != triangle_count))
         return bad("the leaves do not share out the triangles", kAtTriangleCount);

@@ -96,9 +96,9 @@ bool TreeView::is_node(uint32_t slot) const noexcept {
     return load_le<uint16_t>(from + block_offset(kBlockDiagonal, 0, lane)) != 0;
 }
 
-Ellipsoid TreeView::ellipsoid(uint32_t node) const noexcept {
-    assert(is_node(node));
-    const auto [from, lane] = place_of(*this, node);
+namespace {
+
+Ellipsoid ellipsoid_at(const std::byte* from, size_t lane, const LatticeInfo& lattice) {
     format::PackedNode packed;
     for (size_t i = 0; i < 3; ++i) {
         packed.center[i] = load_le<uint16_t>(from + block_offset(kBlockCenter, i, lane));
@@ -106,7 +106,20 @@ Ellipsoid TreeView::ellipsoid(uint32_t node) const noexcept {
         packed.off_diagonal[i] = load_le<int16_t>(from + block_offset(kBlockOffDiagonal, i, lane));
     }
     packed.exponent = load_le<int8_t>(from + kBlockExponent + lane);
-    return format::decode(packed, lattice_);
+    return format::decode(packed, lattice);
+}
+
+} // namespace
+
+Ellipsoid TreeView::ellipsoid(uint32_t node) const noexcept {
+    assert(is_node(node));
+    const auto [from, lane] = place_of(*this, node);
+    return ellipsoid_at(from, lane, lattice_);
+}
+
+Ellipsoid TreeView::bound(uint32_t node) const noexcept {
+    assert(is_node(node));
+    return ellipsoid_at(bounding_block(node / kBlockLanes), node % kBlockLanes, lattice_);
 }
 
 ChildRange TreeView::children(uint32_t node) const noexcept {

@@ -37,9 +37,11 @@ using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
 constexpr size_t kTable = 200, kRow = 60;
-constexpr size_t kBlocks = 384; // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kBounding = 384; // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kBlocks = kBounding + 2 * 256; // of the exact one, which has no bounding blocks, kBounding
 constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
-constexpr size_t kGoldenHash = kEnd + kGoldenBlocks * 64; // of the exact one: what follows its hulls
+constexpr size_t kExactBlock1 = kBounding + 256, kExactBlock2 = kExactBlock1 + 256, kExactEnd = kExactBlock2 + 256;
+constexpr size_t kGoldenHash = kExactEnd + kGoldenBlocks * 64; // what follows its hulls
 constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
 
 std::vector<PackedLevel> golden_levels() {
@@ -116,6 +118,15 @@ Bytes read(const fs::path& path) {
     return {data, data + text.size()};
 }
 
+// PROLATE_WRITE_GOLDEN=1 format_test --gtest_filter=Format.Golden* writes the files anew, for a new version.
+Bytes golden_file(const char* name, const Bytes& now) {
+    const fs::path path = fs::path(PROLATE_TEST_DATA) / name;
+    if (std::getenv("PROLATE_WRITE_GOLDEN") != nullptr) {
+        EXPECT_TRUE(save(path.c_str(), now));
+    }
+    return read(path);
+}
+
 // A copy in an allocation of exactly its size, so that a read beyond the end is seen by AddressSanitizer.
 struct Exact {
     explicit Exact(std::span<const std::byte> from) : size(from.size()), data(new std::byte[from.size()]) {
@@ -166,6 +177,8 @@ void expect_sound(const TreeView& tree) {
     for (uint32_t n = 0; n < tree.slot_count(); ++n) {
         if (!tree.is_node(n)) continue;
         expect_finite(tree.ellipsoid(n));
+        expect_finite(tree.bound(n));
+        ASSERT_TRUE(!tree.is_leaf(n) || tree.bound(n) == tree.ellipsoid(n));
         const ChildRange children = tree.children(n);
         const TriangleRange triangles = tree.triangles(n);
         ASSERT_LE(children.count, tree.degree());
@@ -199,7 +212,7 @@ void expect_sound(const TreeView& tree) {
 }
 
 TEST(Format, GoldenExactFileOfVersionFive) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v5_exact.etree");
+    const Bytes file = golden_file("golden_v5_exact.etree", golden_exact());
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
@@ -217,7 +230,7 @@ TEST(Format, GoldenExactFileOfVersionFive) {
         EXPECT_EQ(tree->triangles(kGoldenSlots[i + 2]).count, kGoldenLeaves[i]);
     }
     EXPECT_EQ(tree->triangles(17).first, 3u);
-    EXPECT_EQ(tree->hull(1), tree->bytes().data() + kEnd + 64);
+    EXPECT_EQ(tree->hull(1), tree->bytes().data() + kExactEnd + 64);
     EXPECT_EQ(tree->hull(1)[1], std::byte{141});
     EXPECT_EQ(tree->hull(1)[48], std::byte{17});
     EXPECT_EQ(tree->hull(2)[48], std::byte{0});
@@ -241,7 +254,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
 }
 
 TEST(Format, GoldenFileOfVersionFive) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v5.etree");
+    const Bytes file = golden_file("golden_v5.etree", golden());
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -338,20 +351,20 @@ TEST(Format, ABlockIsAStructureOfArrays) {
                 EXPECT_EQ(bytes[at + width * lane + i], std::byte(value >> (8 * i) & 0xff)) << at << " lane " << lane;
         }
     };
-    expect_row(kBlock1 + 0, 2, {0, 65535}); // center
-    expect_row(kBlock1 + 16, 2, {0, 1});
-    expect_row(kBlock1 + 32, 2, {0, 2});
-    expect_row(kBlock1 + 48, 2, {1, 300}); // diagonal
-    expect_row(kBlock1 + 64, 2, {2, 200});
-    expect_row(kBlock1 + 80, 2, {65535, 100});
-    expect_row(kBlock1 + 96, 2, {32767}); // off-diagonal
-    expect_row(kBlock1 + 112, 2, {-32768});
-    expect_row(kBlock1 + 128, 2, {});
-    expect_row(kBlock1 + 144, 1, {0, -7});  // exponent
-    expect_row(kBlock1 + 152, 1, {3, 129}); // three children; a leaf of one triangle
-    expect_row(kBlock1 + 160, 4, {16, 0});  // slot of the first child; first triangle
-    expect_row(kBlock2 + 152, 1, {130, 129, 129});
-    expect_row(kBlock2 + 160, 4, {1, 3, 4});
+    expect_row(kExactBlock1 + 0, 2, {0, 65535}); // center
+    expect_row(kExactBlock1 + 16, 2, {0, 1});
+    expect_row(kExactBlock1 + 32, 2, {0, 2});
+    expect_row(kExactBlock1 + 48, 2, {1, 300}); // diagonal
+    expect_row(kExactBlock1 + 64, 2, {2, 200});
+    expect_row(kExactBlock1 + 80, 2, {65535, 100});
+    expect_row(kExactBlock1 + 96, 2, {32767}); // off-diagonal
+    expect_row(kExactBlock1 + 112, 2, {-32768});
+    expect_row(kExactBlock1 + 128, 2, {});
+    expect_row(kExactBlock1 + 144, 1, {0, -7});  // exponent
+    expect_row(kExactBlock1 + 152, 1, {3, 129}); // three children; a leaf of one triangle
+    expect_row(kExactBlock1 + 160, 4, {16, 0});  // slot of the first child; first triangle
+    expect_row(kExactBlock2 + 152, 1, {130, 129, 129});
+    expect_row(kExactBlock2 + 160, 4, {1, 3, 4});
 }
 
 TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
@@ -375,8 +388,8 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    for (const char* name :
-         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v4.etree"}) {
+    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree",
+                             "golden_v3_exact.etree", "golden_v4.etree", "golden_v4_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -404,15 +417,15 @@ TEST(Format, CutsTakeLeavesFromAbove) {
     EXPECT_TRUE(std::ranges::equal(all, kGoldenSlots));
 }
 
-void expect_prefixes(const Bytes& bytes) {
+void expect_prefixes(const Bytes& bytes, size_t block_1) {
     for (const OpenOptions& options : {OpenOptions{}, kNoHash})
         for (size_t n = 0; n < bytes.size(); ++n) {
             const Exact part({bytes.data(), n});
             const auto tree = TreeView::open(part.bytes(), options);
-            const uint32_t levels = n == kBlock1   ? 1
-                                    : n == kBlock2 ? 2
-                                    : n == kEnd    ? 3 // without the triangles
-                                                   : 0;
+            const uint32_t levels = n == block_1         ? 1
+                                    : n == block_1 + 256 ? 2
+                                    : n == block_1 + 512 ? 3 // without the triangles
+                                                         : 0;
             ASSERT_EQ(tree.has_value(), levels > 0) << n;
             if (!tree) {
                 ASSERT_EQ(tree.error().code, ErrorCode::bad_file) << n;
@@ -429,8 +442,8 @@ void expect_prefixes(const Bytes& bytes) {
     EXPECT_FALSE(TreeView::open({}));
 }
 TEST(Format, EveryPrefixIsRefusedUnlessALevelEndsThere) {
-    expect_prefixes(golden());
-    expect_prefixes(golden_exact());
+    expect_prefixes(golden(), kBlock1);
+    expect_prefixes(golden_exact(), kExactBlock1);
 }
 
 void expect_changes_found(Bytes bytes) {
@@ -475,6 +488,7 @@ TEST(Format, NamesTheFirstOffence) {
         uint64_t where;
     };
     const size_t counts = kBlock1 + 152, section = kGoldenHash; // counts of nodes 8 and 9
+    const size_t exact_counts = kExactBlock1 + 152;
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
         {8, {4}, ErrorCode::bad_file, 8},
@@ -518,14 +532,22 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
         {kTable + kRow + 4, {9}, ErrorCode::bad_file, kTable + kRow + 4}, // more nodes than lanes
         {kTable + 8, {0}, ErrorCode::bad_file, kTable + 8},
-        {kTable + 8, {0x80, 3}, ErrorCode::bad_file, kTable + 8},               // two blocks of roots
-        {kTable + kRow + 8, {0x81, 3}, ErrorCode::bad_file, kTable + kRow + 8}, // no whole number of blocks
-        {kTable + kRow + 8, {0x80, 2}, ErrorCode::bad_file, kTable + kRow + 8}, // no block
+        {kTable + 8, {0x80, 5}, ErrorCode::bad_file, kTable + 8},               // two blocks of roots
+        {kTable + kRow + 8, {0x81, 5}, ErrorCode::bad_file, kTable + kRow + 8}, // no whole number of blocks
+        {kTable + kRow + 8, {0x80, 4}, ErrorCode::bad_file, kTable + kRow + 8}, // no block
         {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
         {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
-        {kBlocks - 4, {1}, ErrorCode::bad_file, kBlocks - 4},                   // padding
-        {kBlocks - 1, {1}, ErrorCode::bad_file, kBlocks - 1},
+        {kBounding - 4, {1}, ErrorCode::bad_file, kBounding - 4},             // padding
+        {kBounding - 1, {1}, ErrorCode::bad_file, kBounding - 1},
+        {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 160},       // other children than in the block
+        {kBounding + 160, {16}, ErrorCode::bad_file, kBounding + 160},      // another first child
+        {kBounding + 48, {0, 0}, ErrorCode::bad_file, kBounding + 48},      // no extent
+        {kBounding + 144, {101}, ErrorCode::bad_file, kBounding + 144},     // exponent
+        {kBounding + 192, {255}, ErrorCode::bad_file, kBounding + 192},     // lower corner above the upper one
+        {kBounding + 243, {16}, ErrorCode::bad_file, kBounding + 240},      // box origin
+        {kBounding + 50, {1}, ErrorCode::bad_file, kBounding + 50},         // beside the root
+        {kBounding + 256 + 2, {1}, ErrorCode::bad_file, kBounding + 258},   // another center of a leaf
         {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},     // first child
         {counts, {4}, ErrorCode::bad_file, counts},                   // more children than the degree
         {counts, {2}, ErrorCode::bad_file, kBlock1},                  // children that are not the next level
@@ -554,13 +576,13 @@ TEST(Format, NamesTheFirstOffence) {
         {120, {0}, ErrorCode::bad_file, 120},                               // no triangles
         {124, {0}, ErrorCode::bad_file, 124},                               // no component
         {124, {8}, ErrorCode::bad_file, 124},                               // more than vertices
-        {counts + 1, {0}, ErrorCode::bad_file, counts + 1},                 // a leaf of none
-        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},               // another of none
-        {counts + 1, {130}, ErrorCode::bad_file, kBlock2 + 160},            // one that the next leaf has too
-        {kBlock2 + 154, {130}, ErrorCode::bad_file, 120},                   // one more than there are
-        {counts, {131}, ErrorCode::bad_file, kBlock1 + 160},                // an inner node's children as triangles
-        {kEnd + 64 + 49, {1}, ErrorCode::bad_file, kEnd + 64 + 49},         // reserved bytes of a hull
-        {kEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kEnd + 2 * 64 + 63}, // likewise
+        {exact_counts + 1, {0}, ErrorCode::bad_file, exact_counts + 1},                 // a leaf of none
+        {exact_counts + 1, {128}, ErrorCode::bad_file, exact_counts + 1},               // another of none
+        {exact_counts + 1, {130}, ErrorCode::bad_file, kExactBlock2 + 160},            // one that the next leaf has too
+        {kExactBlock2 + 154, {130}, ErrorCode::bad_file, 120},                   // one more than there are
+        {exact_counts, {131}, ErrorCode::bad_file, kExactBlock1 + 160},                // an inner node's children as triangles
+        {kExactEnd + 64 + 49, {1}, ErrorCode::bad_file, kExactEnd + 64 + 49},         // reserved bytes of a hull
+        {kExactEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kExactEnd + 2 * 64 + 63}, // likewise
         {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
         {section + 8 + 7 * 12 + 2 * 6 + 4, {7}, ErrorCode::bad_file, section + 8 + 7 * 12 + 12}, // no such vertex
     };

@@ -164,11 +164,21 @@ public:
     /// children, which are not there: children() knows.
     const std::byte* block(uint32_t b) const noexcept { return blocks_ + size_t{b} * kBlockBytes; }
 
+    /// The block as queries of the whole tree take it: the same nodes, but in a tree without triangles the ellipsoid and
+    /// the box of an inner node hold those of all nodes below it. Its own ellipsoid does not: it approximates the part
+    /// of the solid that the node stands for, out of which those below stick in other places.
+    const std::byte* bounding_block(uint32_t b) const noexcept {
+        return (b < bounding_count_ ? bounding_blocks_ : blocks_) + size_t{b} * kBlockBytes;
+    }
+
     /// The ellipsoid of `node`, exactly as stored: every float is an integer times a power of two. Here and below, a
     /// node is a slot for which is_node() holds.
     Ellipsoid ellipsoid(uint32_t node) const noexcept;
-    /// ellipsoid(0), which holds everything.
+    /// ellipsoid(0), which holds the solid.
     const Ellipsoid& root() const noexcept { return root_; }
+    /// The ellipsoid in bounding_block(): of a leaf, its own; of an inner node, it holds all leaves below, or if
+    /// has_triangles() all triangles.
+    Ellipsoid bound(uint32_t node) const noexcept;
     /// The children of `node`; none for a leaf, and none for the last level of a prefix.
     ChildRange children(uint32_t node) const noexcept;
     bool is_leaf(uint32_t node) const noexcept { return children(node).count == 0; }
@@ -219,6 +229,8 @@ private:
     }
     std::span<const std::byte> bytes_;
     const std::byte* blocks_ = nullptr;
+    const std::byte* bounding_blocks_ = nullptr; // of blocks 0 ... bounding_count_ - 1
+    uint32_t bounding_count_ = 0;
     const std::byte* hulls_ = nullptr; // null without triangles
     LatticeInfo lattice_;
     Ellipsoid root_;

@@ -1,0 +1,24 @@
+// What queries make of numbers that no length can be, as query.hpp has it.
+#pragma once
+
+#include <prolate/query.hpp>
+
+#include <limits>
+
+namespace prolate::query {
+
+/// A length that only widens what is claimed: negative counts as 0, NaN as infinite.
+template <class Float> Float sound_length(Float x) noexcept {
+    return x >= 0 ? x : x < 0 ? Float{0} : std::numeric_limits<Float>::infinity();
+}
+/// One that a caller asks for, and may leave out: negative and NaN count as 0.
+inline double sound_tolerance(double x) noexcept {
+    return x > 0 ? x : 0;
+}
+
+inline QueryOptions sound(QueryOptions options) noexcept {
+    options.margin = sound_length(options.margin);
+    return options;
+}
+
+} // namespace prolate::query
