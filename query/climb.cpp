@@ -96,6 +96,7 @@ uint32_t Hills::step(uint32_t vertex, const dvec3& up) const noexcept {
     double most = from;
     triangles_at(vertex, [&](const Triangle& corners) {
         for (const uint32_t v : corners) {
+            if (v == vertex) continue;
             const double h = height(v, up); // of equally high ones the first by index, whatever the tree's order
             if (h > most || (h == most && h > from && v < top)) top = v, most = h;
         }

@@ -40,7 +40,9 @@ constexpr double kTolerance = 1e-7;    // of the smaller ellipsoid: how exact de
 constexpr double kSamePoint = 1e-4;    // of the smaller body: what is nearer is one point
 constexpr double kSameFace = 0.9;      // cosine: a face turned farther from a normal has no points along it
 constexpr double kSameAsFace = 0.9999; // cosine: a normal that is the face's
-constexpr double kSameNormal = 0.8;    // cosine: normals of a point in two queries, if it is the same
+constexpr double kFirstTilt = 0.1, kLeastTilt = 1e-3; // radians, about: steps of the search for the shortest way
+constexpr int kTiltRounds = 8;
+constexpr double kSameNormal = 0.8; // cosine: normals of a point in two queries, if it is the same
 
 // The finisher of SplitMix64 (Steele, Lea, Flood 2014).
 uint64_t mixed(uint64_t x) {
@@ -80,6 +82,10 @@ struct Contact {
     double overlap; // of the bodies around the pair
 };
 
+dvec3 perpendicular(const dvec3& n) {
+    return glm::normalize(glm::cross(n, std::abs(n.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)));
+}
+
 class Collector {
 public:
     Collector(Descent& descent, QueryContext& context, bool swapped, const ContactManifolds& last,
@@ -109,8 +115,9 @@ public:
         Group groups[Patches::kMost];
         uint32_t count = 0;
         patches_.for_each([&](const Patch& p) {
-            Group group{&p, {p.normal(), p.depth()}, Patch(p.normal())};
-            add_deepest(p, group.deepest);
+            const dvec3 n = shortest_way(p);
+            Group group{&p, {n, p.depth()}, Patch(n)};
+            add_deepest(p, n, group.deepest);
             group.way.depth = std::max(group.way.depth, group.deepest.depth());
             uint32_t at = count++; // the deepest first
             for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];
@@ -303,12 +310,62 @@ private:
         }
         hand_on(best, deepest + 0.5 * least * best, least);
     }
+    // ---- the way out of curved bodies ----
+
+    // What the bodies overlap by along n around two of their vertices, which it moves to the tops of their climbs; what
+    // is above `enough` may be too little.
+    double overlap(const dvec3& n, uint32_t& vertex_a, uint32_t& vertex_b, double enough) const {
+        Climb a{&hills_a_, n, vertex_a, vertex_a, kClimbSteps},
+            b{&hills_b_, -(n * d_.b_to_a.rotation), vertex_b, vertex_b, kClimbSteps};
+        const dvec3 at_a = to_double(d_.a.tree.vertex(vertex_a)),
+                    at_b = d_.b_to_a.rotation * to_double(d_.b.tree.vertex(vertex_b)) + d_.b_to_a.translation;
+        double sum = glm::dot(n, at_a - at_b);
+        while (sum <= enough && a.steps_left > 0) sum += a.step();
+        while (sum <= enough && b.steps_left > 0) sum += b.step();
+        vertex_a = a.vertex, vertex_b = b.vertex;
+        return sum;
+    }
+
+    // The normal of a patch. Finely meshed curved bodies have as many normals as triangles that meet, all around the
+    // place where they are deepest: from their mean on, the direction is turned to where they overlap least, by the
+    // parabolas through the overlaps of a pattern of directions (Hooke and Jeeves 1961, with the step of Powell 1964).
+    dvec3 shortest_way(const Patch& patch) const {
+        const dvec3 mean = patch.normal();
+        const MeetingPair& pair = patch.begin()->pair;
+        if (!patch.mixed() || pair.triangle_a == kNoTriangle || pair.triangle_b == kNoTriangle) return mean;
+        const Surrounded a = surrounded_a(pair.triangle_a), b = surrounded_b(pair.triangle_b);
+        dvec3 best = mean;
+        uint32_t vertex_a = a.corners[a.highest(best)], vertex_b = b.corners[b.highest(-best)];
+        const double most = patch.overlap() + patches_.apart();
+        double least = overlap(best, vertex_a, vertex_b, most);
+        if (!(least <= most)) return mean; // around here the bodies are not convex
+        double tilt = kFirstTilt;
+        for (int round = 0; round < kTiltRounds && tilt > kLeastTilt; ++round) {
+            const dvec3 center = best, x = perpendicular(center), y = glm::cross(center, x);
+            const double here = least;
+            const auto look = [&](double along_x, double along_y) {
+                const dvec3 n = glm::normalize(center + along_x * x + along_y * y);
+                uint32_t of_a = vertex_a, of_b = vertex_b;
+                const double found = overlap(n, of_a, of_b, 4 * std::abs(here) + patches_.apart());
+                if (found < least && glm::dot(n, mean) > kSameFace)
+                    best = n, least = found, vertex_a = of_a, vertex_b = of_b;
+                return found;
+            };
+            const auto lowest = [&](double before, double after) { // of the parabola
+                const double bend = before + after - 2 * here;
+                return bend > 0 ? std::clamp(tilt * (before - after) / (2 * bend), -tilt, tilt) : 0;
+            };
+            const double left = look(-tilt, 0), right = look(tilt, 0), below = look(0, -tilt), above = look(0, tilt);
+            look(lowest(left, right), lowest(below, above));
+            if (glm::dot(best, center) > 1 - tilt * tilt / 8) tilt /= 4; // moved by less than half of it
+        }
+        return best;
+    }
     // ---- the deepest points ----
 
     // What of a finely meshed body is deepest in the other meets no triangle. From the pairs of a patch the bodies are
     // climbed along its normal to what is deepest around there, and a ray from it finds the other body's surface.
-    void add_deepest(const Patch& from, Patch& to) {
-        const dvec3 n = from.normal();
+    void add_deepest(const Patch& from, const dvec3& n, Patch& to) {
         for (const bool of_a : {true, false}) {
             uint32_t seen[Patch::kSieve], count = 0; // vertices
             for (const Candidate& c : from) {

@@ -10,7 +10,8 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kSameNormal = 0.9; // cosine
+constexpr double kSameNormal = 0.9;    // cosine
+constexpr double kAgreeing = 1 - 1e-6; // of the weights: a mean that is as long is one of the same normals
 constexpr double kPreferKnown = 1.1;
 constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
 
@@ -33,7 +34,7 @@ bool Patch::takes(const dvec3& normal) const noexcept {
 }
 
 void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap, double apart) noexcept {
-    sum_ += weight * normal;
+    sum_ += weight * normal, weight_ += weight;
     overlap_ = std::max(overlap_, overlap);
     const double x = glm::dot(x_, candidate.middle), y = glm::dot(y_, candidate.middle);
     constexpr double kDiagonal = 0.7071067811865476;
@@ -51,6 +52,10 @@ void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, 
 dvec3 Patch::normal() const noexcept {
     const double length = glm::length(sum_);
     return length > 0 ? sum_ / length : seed_;
+}
+
+bool Patch::mixed() const noexcept {
+    return glm::length(sum_) < kAgreeing * weight_;
 }
 
 uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept {

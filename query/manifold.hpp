@@ -43,12 +43,15 @@ public:
     double overlap() const noexcept { return overlap_; }                      ///< the largest
     const Candidate* begin() const noexcept { return sieve_; } ///< those that stand for all, if there are any
     const Candidate* end() const noexcept { return sieve_ + kSieve; }
-    glm::dvec3 normal() const noexcept;
+    glm::dvec3 normal() const noexcept; ///< the mean
+    /// Is the mean one of different normals?
+    bool mixed() const noexcept;
     /// The best four or fewer. Returns how many.
     uint32_t reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept;
 
 private:
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
+    double weight_ = 0;
     Candidate sieve_[kSieve];
     double reach_[kSieve]; // what each is the best for: depth, or coordinate
     double overlap_ = -1e300;
