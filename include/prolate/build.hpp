@@ -15,7 +15,7 @@ namespace prolate {
 /// them, and of the rest only degree, leaf_triangles and threads change it.
 struct BuildOptions {
     uint32_t degree = 8;           ///< children per node, 2 ... kMaxDegree
-    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1
+    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more gain nothing
     uint32_t ellipsoids = 0;       ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
     float tolerance = 0;           ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
     float distance = 0;            ///< the same for their Hausdorff distance, in % of the diagonal of the mesh's box
@@ -35,7 +35,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
 /// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
-inline constexpr uint32_t kBuilderVersion = 8;
+inline constexpr uint32_t kBuilderVersion = 9;
 
 /// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
 /// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
@@ -73,6 +73,9 @@ struct Build {
     double seconds = 0;
 };
 
+/// Leaves of a tree of so many levels are at most about 1.3 times as far from the solid, in volume outside it (all of
+/// their union, if the mesh encloses nothing), as the set that `ellipsoids` finds for their number.
+///
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
 /// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
