@@ -32,6 +32,10 @@ constexpr int kRounds = 12;                 // at most, of a search for the coun
 constexpr double kMet = 0.999;              // of a limit: quantisation will add a little
 constexpr double kCountTolerance = 1.1;     // the search ends this close to the least count
 constexpr double kLeastGain = 0.999;        // a level must bring the outside volume down to less than this much
+// What a tree's leaves may have outside, times what as many have that nothing above them limits. build.hpp
+// promises 1.3; the rest is for what is estimated on the way.
+constexpr double kMostLoss = 1.27;
+constexpr double kMostSettling = 1.4; // a set that all but covers seldom gains more volume when it has to cover
 
 class Grower {
 public:
@@ -51,7 +55,7 @@ public:
         else if (goal.tolerance > 0 || goal.distance > 0)
             grow_upwards(meet_limits());
         else
-            grow_downwards(goal.levels ? goal.levels : 3);
+            grow_levels(goal.levels ? goal.levels : 3);
         if (!cancelled()) tidy();
         return std::move(grown_);
     }
@@ -59,11 +63,22 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
 
-    // A set of ellipsoids that covers, and which piece belongs to which.
+    struct Leaf {
+        Fit fit;
+        std::vector<uint32_t> pieces;
+    };
+    // A set of ellipsoids that all but covers, as descents leave it.
+    struct Approach {
+        EllipsoidSet set;
+        double error = HUGE_VAL; // see approximate_error()
+    };
+    // One that covers.
     struct Solved {
         EllipsoidSet set;
-        std::vector<uint32_t> owner; // of each piece
-        double outside = HUGE_VAL;   // cubic metres
+        std::vector<Leaf> leaves;  // one for each of the set; those that the others make redundant own nothing
+        size_t count = 0;          // that own something
+        double outside = HUGE_VAL; // of these, cubic metres
+        double settling = 1;       // times the volume outside before it was made to cover
     };
     // What a set is made for: some parents, each with its cells and the number of children it is to have.
     struct Task {
@@ -107,14 +122,16 @@ private:
 
     // --- one set ----------------------------------------------------------------------------------------------------
 
-    Solved solve(const Task& task, const std::function<void(double)>& progress) {
-        Effort effort = options_.effort;
+    Solved solve(const Task& task, const Effort& effort, const std::function<void(double)>& progress) {
+        return settle(approach(task, effort, progress));
+    }
+
+    Approach approach(const Task& task, Effort effort, const std::function<void(double)>& progress) {
         if (task.cells.size() == 1) // few ellipsoids cost little, and more depends on where they start
             effort.starts *= std::clamp(static_cast<int>(kManyStarts / task.children), 1, kMostStarts);
         const int rounds = effort.starts + effort.cycles;
-        EllipsoidSet best;
+        Approach best;
         std::vector<uint32_t> best_owner;
-        double least = HUGE_VAL;
         gather_points(task);
         for (int start = 0; start < effort.starts && !cancelled(); ++start) {
             std::vector<uint32_t> owner;
@@ -122,20 +139,33 @@ private:
             descend_set(set, owner, effort.iterations, 1, start,
                         [&](double done) { progress(0.9 * (start + done) / rounds); });
             const double error = approximate_error(set);
-            if (error < least || best.fits.empty()) least = error, best = std::move(set), best_owner = std::move(owner);
+            if (error < best.error || best.set.fits.empty()) best = {std::move(set), error}, best_owner.swap(owner);
         }
         for (int cycle = 0; cycle < effort.cycles && !cancelled(); ++cycle) {
-            EllipsoidSet set = best;
+            EllipsoidSet set = best.set;
             descend_set(set, best_owner, effort.iterations / 2, kReheat, effort.starts + cycle,
                         [&](double done) { progress(0.9 * (effort.starts + cycle + done) / rounds); });
             const double error = approximate_error(set);
-            if (error < least) least = error, best = std::move(set);
+            if (error < best.error) best = {std::move(set), error};
         }
+        return best;
+    }
+
+    Solved settle(Approach approach) {
         if (cancelled()) return {};
-        refine_seams(pieces_, best);
-        Solved out{std::move(best), {}, 0};
-        out.owner = polish_set(out.set);
-        out.outside = outside_of(out.set.fits);
+        refine_seams(pieces_, approach.set);
+        const std::vector<uint32_t> owner = polish_set(approach.set);
+        Solved out;
+        out.set = std::move(approach.set);
+        out.leaves.resize(out.set.fits.size());
+        for (size_t i = 0; i < out.leaves.size(); ++i) out.leaves[i].fit = out.set.fits[i];
+        for (uint32_t piece = 0; piece < owner.size(); ++piece) out.leaves[owner[piece]].pieces.push_back(piece);
+        std::vector<Fit> needed;
+        for (const Leaf& leaf : out.leaves)
+            if (!leaf.pieces.empty()) needed.push_back(leaf.fit);
+        out.outside = outside_of(needed);
+        out.count = needed.size();
+        out.settling = out.outside / approach.error;
         return out;
     }
 
@@ -154,9 +184,11 @@ private:
     CoverVolume measure(std::span<const Fit> fits) const { return measure_cover(solid_.columns, ellipsoids_of(fits)); }
     double outside_of(std::span<const Fit> fits) const { return measure(fits).outside.value; }
 
+    static bool merges(const Task& task) { return task.children * task.cells.size() <= kMergeLimit; }
+
     EllipsoidSet start_set(const Task& task, int start, std::vector<uint32_t>& owner) const {
         const bool few = task.children <= kFew && task.cells.size() == 1;
-        const bool merging = task.children <= kMergeLimit && (start % 2 == 0) == few;
+        const bool merging = merges(task) && (start % 2 == 0) == few;
         const auto seed = options_.build.seed + static_cast<uint64_t>(start);
         const uint32_t pieces_per_cluster =
             kPiecesPerCluster[static_cast<size_t>(start) / 2 % std::size(kPiecesPerCluster)];
@@ -237,31 +269,88 @@ private:
 
     // --- downwards --------------------------------------------------------------------------------------------------
 
-    void grow_downwards(uint32_t levels) {
+    // Level by level. Where a level of so many nodes gains nothing, the next one is split off the same parents: what a
+    // shell's eight children cannot do, their 64 children can, and a ball's cannot either. The levels left out are then
+    // grown upwards between the two.
+    void grow_levels(uint32_t levels) {
         std::vector<uint32_t> parents{0};
-        double outside = outside_of({&grown_.nodes[0].fit, 1});
-        double done = 0, all = 0; // work, in nodes
-        for (uint32_t l = 1; l <= levels; ++l) all += std::pow(options_.build.degree, l);
-        for (uint32_t level = 1; level <= levels && !cancelled(); ++level) {
-            const double share = std::pow(options_.build.degree, level);
+        const double root_outside = outside_of({&grown_.nodes[0].fit, 1});
+        double outside = root_outside;
+        double settling = 1;
+        size_t count = 1;
+        uint32_t level = 0; // of the parents
+        double done = 0, all = most_nodes(levels);
+        for (uint32_t l = 1; l <= levels; ++l) all += most_nodes(l);
+        const auto step = [&](double share) {
+            return [this, share, &done, &all](double part) { report((done + part * share) / all); };
+        };
+        bool limited = false; // the lowest level, by those above
+        for (uint32_t l = 1; l <= levels && !cancelled(); ++l) {
             const uint32_t piece_count = pieces_.size();
-            const Solved solved = solve(task_below(parents), [&](double part) { report((done + part * share) / all); });
-            done += share;
+            const Task task = task_below(parents, l - level);
+            Effort effort = options_.effort;
+            if (l == levels && !task.chains.empty() && !merges(task)) // the set that nothing limits stands in for one
+                effort.starts = std::max(1, effort.starts - 1);
+            const Solved solved = solve(task, effort, step(most_nodes(l)));
+            done += most_nodes(l);
             if (cancelled()) return;
-            if (solved.outside >= kLeastGain * outside) { // as for a ball
-                grown_.goal_reached = false;
+            if (solved.outside >= kLeastGain * outside) {
                 follow_cuts(grown_.nodes, piece_count);
-                return;
+                continue;
             }
-            outside = solved.outside;
-            parents = attach(solved, parents);
+            outside = solved.outside, count = solved.count, settling = solved.settling;
+            if (count == 1) { // the root itself, a little better
+                grown_.nodes[0].fit = only_needed(solved);
+                follow_cuts(grown_.nodes, piece_count);
+                continue;
+            }
+            limited = !task.chains.empty();
+            parents = attach(solved, parents, l - level);
+            level = l;
+            end_level(l);
+        }
+        if (level > 0 && (level < levels || limited)) {
+            // Seams of the levels above are seams of the leaves: that costs some volume. Too much, or all that a level
+            // could have gained, and the tree is grown upwards from a set that nothing limits.
+            const auto keep = [&](double free_outside, size_t free_count) {
+                if (level < levels) return kLeastGain * outside <= free_outside;
+                const double steepness = std::log(root_outside / free_outside) / std::log(free_count); // as errors fall
+                const double fewer = static_cast<double>(free_count) / static_cast<double>(count);
+                return outside <= kMostLoss * free_outside * std::pow(fewer, std::clamp(steepness, 0.0, 1.0));
+            };
+            const uint32_t piece_count = pieces_.size();
+            Effort effort = options_.effort;
+            effort.starts = 1, effort.cycles = 0;
+            Approach free = approach(task_below({0}, levels), effort, step(most_nodes(levels)));
+            if (cancelled()) return;
+            if (!keep(std::clamp(settling, 1.0, kMostSettling) * free.error, free.set.fits.size())) {
+                const Solved solved = settle(std::move(free));
+                if (cancelled()) return;
+                if (keep(solved.outside, solved.count)) {
+                    follow_cuts(grown_.nodes, piece_count);
+                } else {
+                    grown_.nodes.resize(1);
+                    attach(solved, {0}, levels);
+                    level = levels;
+                }
+            }
             end_level(level);
         }
+        grown_.goal_reached = level == levels;
     }
 
-    Task task_below(const std::vector<uint32_t>& parents) const {
+    static const Fit& only_needed(const Solved& solved) {
+        return std::ranges::find_if(solved.leaves, [](const Leaf& leaf) { return !leaf.pieces.empty(); })->fit;
+    }
+
+    // Of a level, by the degree.
+    double most_nodes(uint32_t level) const { return std::pow(options_.build.degree, level); }
+
+    // Sets of so many levels below the parents.
+    Task task_below(const std::vector<uint32_t>& parents, uint32_t levels) const {
         Task task;
-        task.children = options_.build.degree;
+        const double most = std::max<double>(options_.build.degree, kMaxLeaves / static_cast<double>(parents.size()));
+        task.children = static_cast<uint32_t>(std::min(most_nodes(levels), most));
         if (parents.size() == 1 && parents[0] == 0) {
             task.cells = {all_cells()};
             return task;
@@ -299,12 +388,8 @@ private:
         return out;
     }
 
-    // Makes nodes of the ellipsoids that own something, as children of `parents`, whose pieces become their children's.
-    // Returns the new nodes.
-    std::vector<uint32_t> attach(const Solved& solved, const std::vector<uint32_t>& parents) {
-        std::vector<std::vector<uint32_t>> pieces(solved.set.fits.size());
-        for (uint32_t piece = 0; piece < solved.owner.size(); ++piece) pieces[solved.owner[piece]].push_back(piece);
-        for (const uint32_t p : parents) grown_.nodes[p].pieces.clear();
+    // Makes nodes of the ellipsoids that own something, `levels` below `parents`. Returns the new leaves.
+    std::vector<uint32_t> attach(const Solved& solved, const std::vector<uint32_t>& parents, uint32_t levels) {
         for (size_t p = 0; p < solved.set.chains.size(); ++p) { // the polish may have enlarged them
             uint32_t node = parents[p];
             for (const Fit& fit : solved.set.chains[p]) {
@@ -312,22 +397,12 @@ private:
                 node = grown_.nodes[node].parent;
             }
         }
-        std::vector<uint32_t> added;
-        for (uint32_t p = 0; p < parents.size(); ++p) {
-            grown_.nodes[parents[p]].first_child = static_cast<uint32_t>(grown_.nodes.size());
-            for (size_t i = 0; i < pieces.size(); ++i) {
-                if (pieces[i].empty() || (solved.set.parent.empty() ? 0 : solved.set.parent[i]) != p) continue;
-                added.push_back(static_cast<uint32_t>(grown_.nodes.size()));
-                GrownNode node;
-                node.fit = solved.set.fits[i];
-                node.level = grown_.nodes[parents[p]].level + 1;
-                node.parent = parents[p];
-                node.pieces = pieces[i];
-                grown_.nodes.push_back(std::move(node));
-                ++grown_.nodes[parents[p]].child_count;
-            }
-        }
-        return added;
+        std::vector<Group> groups(parents.size());
+        for (size_t p = 0; p < parents.size(); ++p) groups[p].node = parents[p];
+        for (uint32_t i = 0; i < solved.leaves.size(); ++i)
+            if (!solved.leaves[i].pieces.empty())
+                groups[solved.set.parent.empty() ? 0 : solved.set.parent[i]].members.push_back(i);
+        return grow_between(std::move(groups), solved.leaves, levels);
     }
 
     // Pieces that were cut since `count` there were belong to whom their wholes belong. Owners: nodes or leaves.
@@ -371,21 +446,12 @@ private:
 
     // --- upwards ----------------------------------------------------------------------------------------------------
 
-    struct Leaf {
-        Fit fit;
-        std::vector<uint32_t> pieces;
-    };
-
     std::vector<Leaf> solve_flat(uint32_t count, const std::function<void(double)>& progress) {
         Task task;
         task.children = count;
         task.cells = {all_cells()};
-        const Solved solved = solve(task, progress);
+        std::vector<Leaf> leaves = solve(task, options_.effort, progress).leaves;
         if (cancelled()) return {};
-        std::vector<Leaf> leaves(solved.set.fits.size());
-        for (size_t i = 0; i < leaves.size(); ++i) leaves[i].fit = solved.set.fits[i];
-        for (uint32_t piece = 0; piece < solved.owner.size(); ++piece)
-            leaves[solved.owner[piece]].pieces.push_back(piece);
         std::erase_if(leaves, [](const Leaf& leaf) { return leaf.pieces.empty(); });
         while (leaves.size() < count) {
             // Some were redundant. Halve the largest, and then the next: the count is what was asked for.
@@ -478,62 +544,82 @@ private:
         return best;
     }
 
-    // A tree over `leaves`, about as high as the degree needs: in each group, those merge that fit together best.
+    // A tree over `leaves`, about as high as the degree needs.
     void grow_upwards(const std::vector<Leaf>& leaves) {
         if (cancelled() || leaves.size() < 2) return;
+        std::vector<Group> root(1);
+        root[0].members.resize(leaves.size());
+        std::iota(root[0].members.begin(), root[0].members.end(), 0u);
+        grow_between(std::move(root), leaves, 0);
+    }
+
+    // Some leaves that are to be below a node.
+    struct Group {
+        uint32_t node = 0;
+        std::vector<uint32_t> members; // rising
+    };
+
+    // Makes nodes of `leaves`, below those of their groups, whose pieces become theirs, and of the groups between:
+    // those merge that fit together best. The leaves are at most `levels` below; 0: as many as it takes. Returns their
+    // nodes.
+    std::vector<uint32_t> grow_between(std::vector<Group> groups, const std::vector<Leaf>& leaves, uint32_t levels) {
         std::vector<Sketch> sketches(leaves.size());
         std::vector<Fit> fits;
-        for (size_t i = 0; i < leaves.size(); ++i) {
-            for (const uint32_t piece : leaves[i].pieces) sketches[i].add(pieces_.points(piece));
-            fits.push_back(leaves[i].fit);
+        std::vector<std::vector<uint32_t>> touching;
+        if (levels != 1) {
+            for (size_t i = 0; i < leaves.size(); ++i) {
+                for (const uint32_t piece : leaves[i].pieces) sketches[i].add(pieces_.points(piece));
+                fits.push_back(leaves[i].fit);
+            }
+            touching = neighbours_of(fits, 1);
         }
-        const std::vector<std::vector<uint32_t>> touching = neighbours_of(fits, 1);
-
-        // Breadth-first, so that the children of a node are consecutive.
-        struct Group {
-            uint32_t node;
-            std::vector<uint32_t> members; // leaves
-        };
-        std::vector<Group> groups(1);
-        groups[0].node = 0;
-        groups[0].members.resize(leaves.size());
-        std::iota(groups[0].members.begin(), groups[0].members.end(), 0u);
-        grown_.nodes[0].pieces.clear();
-        for (uint32_t level = 1; !groups.empty(); ++level) {
+        for (const Group& group : groups) grown_.nodes[group.node].pieces.clear();
+        std::vector<uint32_t> made;
+        for (uint32_t left = levels; !groups.empty(); --left) { // breadth-first: children of a node are consecutive
             std::vector<std::vector<std::vector<uint32_t>>> parts(groups.size());
-            parallel_for(size_t{0}, groups.size(),
-                         [&](size_t g) { parts[g] = parts_of(groups[g].members, fits, sketches, touching); });
+            const size_t most = levels == 0 ? 0 : static_cast<size_t>(std::min(most_nodes(left - 1), 0x1p32));
+            parallel_for(size_t{0}, groups.size(), [&](size_t g) {
+                parts[g] = parts_of(groups[g].members, most, fits, sketches, touching);
+            });
             std::vector<Group> next;
+            uint32_t level = 0;
             for (size_t g = 0; g < groups.size(); ++g) {
                 const uint32_t parent = groups[g].node;
+                level = grown_.nodes[parent].level + 1;
                 grown_.nodes[parent].first_child = static_cast<uint32_t>(grown_.nodes.size());
                 grown_.nodes[parent].child_count = static_cast<uint32_t>(parts[g].size());
                 for (std::vector<uint32_t>& part : parts[g]) {
+                    const auto index = static_cast<uint32_t>(grown_.nodes.size());
                     GrownNode node;
                     node.level = level;
                     node.parent = parent;
                     if (part.size() == 1) {
                         node.fit = leaves[part[0]].fit;
                         node.pieces = leaves[part[0]].pieces;
+                        made.push_back(index);
                     } else {
                         std::vector<uint32_t> pieces;
                         for (const uint32_t leaf : part)
                             pieces.insert(pieces.end(), leaves[leaf].pieces.begin(), leaves[leaf].pieces.end());
                         node.fit = fit_around(pieces);
-                        next.push_back({static_cast<uint32_t>(grown_.nodes.size()), std::move(part)});
+                        next.push_back({index, std::move(part)});
                     }
                     grown_.nodes.push_back(std::move(node));
                 }
             }
             groups.swap(next);
-            if (groups.empty()) end_level(level);
+            if (groups.empty() && levels == 0) end_level(level);
         }
+        return made;
     }
 
-    // Some leaves in as many groups as a node has children, none of them much larger than its share, if that can be.
-    std::vector<std::vector<uint32_t>> parts_of(const std::vector<uint32_t>& members, std::span<const Fit> fits,
-                                                std::span<const Sketch> sketches,
+    // Some leaves in as many groups as a node has children, of at most `most` leaves each; 0: none of them much larger
+    // than its share, if that can be.
+    std::vector<std::vector<uint32_t>> parts_of(const std::vector<uint32_t>& members, size_t most,
+                                                std::span<const Fit> fits, std::span<const Sketch> sketches,
                                                 std::span<const std::vector<uint32_t>> touching) const {
+        const uint32_t degree = options_.build.degree;
+        if (members.size() <= degree) return singly(members);
         const std::vector<std::vector<uint32_t>> units = halved(members, fits, std::min(members.size(), kMostUnits));
         std::vector<Sketch> own(units.size());
         std::map<uint32_t, uint32_t> unit_of; // of each leaf
@@ -545,16 +631,25 @@ private:
                 if (const auto found = unit_of.find(other); found != unit_of.end() && found->second != unit)
                     neighbours[unit].push_back(found->second);
 
-        const uint32_t degree = options_.build.degree;
-        const double share = std::min(kMostShare / degree, kMostShareOfAll);
-        const auto most = static_cast<size_t>(std::ceil(share * static_cast<double>(units.size())));
+        const double share = std::min(kMostShare / degree, kMostShareOfAll) * static_cast<double>(units.size());
+        const size_t most_units =
+            most ? std::max<size_t>(1, most * units.size() / members.size()) : static_cast<size_t>(std::ceil(share));
         std::vector<std::vector<uint32_t>> parts;
         for (const std::vector<uint32_t>& group :
-             merge_groups(own, neighbours, degree, most, options_.min_radius, outside_volume_)) {
+             merge_groups(own, neighbours, degree, most_units, options_.min_radius, outside_volume_)) {
             std::vector<uint32_t>& part = parts.emplace_back();
             for (const uint32_t unit : group) part.insert(part.end(), units[unit].begin(), units[unit].end());
+            std::sort(part.begin(), part.end());
         }
-        return parts;
+        const auto too_large = [&](const std::vector<uint32_t>& part) { return most && part.size() > most; };
+        // Merging gets stuck where all are nearly full. Equal shares fit.
+        return std::ranges::any_of(parts, too_large) ? halved(members, fits, degree) : parts;
+    }
+
+    static std::vector<std::vector<uint32_t>> singly(const std::vector<uint32_t>& leaves) {
+        std::vector<std::vector<uint32_t>> out;
+        for (const uint32_t leaf : leaves) out.push_back({leaf});
+        return out;
     }
 
     // Leaves in `count` units of about the same size, by place.

@@ -120,12 +120,13 @@ public:
 
     std::vector<uint32_t> owners() {
         find_candidates();
+        const std::vector<bool> redundant = find_redundant();
         std::vector<uint32_t> owner(pieces_.size(), kNobody);
         std::vector<double> nearest(pieces_.size(), HUGE_VAL);
         for (uint32_t i = 0; i < fits_.size(); ++i)
             for (size_t c = 0; c < candidates_[i].size(); ++c) {
                 const uint32_t piece = candidates_[i][c];
-                if (!held_[i][c]) continue;
+                if (!held_[i][c] || redundant[i]) continue;
                 const double radial = fits_[i].radial_squared(pieces_.center(piece));
                 if (radial < nearest[piece]) nearest[piece] = radial, owner[piece] = i;
             }
@@ -134,6 +135,19 @@ public:
 
 private:
     static constexpr uint32_t kNobody = UINT32_MAX;
+
+    // Ellipsoids that need not be there, as others hold all that they hold; small ones go first.
+    std::vector<bool> find_redundant() {
+        std::vector<uint32_t> order(fits_.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::vector<double> volume(fits_.size());
+        for (size_t i = 0; i < fits_.size(); ++i) volume[i] = fits_[i].volume();
+        std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return volume[a] < volume[b]; });
+        std::vector<bool> out(fits_.size(), false);
+        for (const uint32_t i : order)
+            if (held_alone(i).empty()) out[i] = true, count(i, -1);
+        return out;
+    }
 
     // For each ellipsoid, the pieces that it holds or may come to hold; and groups of ellipsoids far apart, that can
     // be moved at the same time.

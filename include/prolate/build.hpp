@@ -15,7 +15,7 @@ namespace prolate {
 /// them, and of the rest only degree, leaf_triangles and threads change it.
 struct BuildOptions {
     uint32_t degree = 8;           ///< children per node, 2 ... kMaxDegree
-    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1
+    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more gain nothing
     uint32_t ellipsoids = 0;       ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
     float tolerance = 0;           ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
     float distance = 0;            ///< the same for their Hausdorff distance, in % of the diagonal of the mesh's box
@@ -80,6 +80,9 @@ struct Build {
 /// it were that thick.
 inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kThinnestNodeOfPlace = 0x1p-21;
 
+/// Leaves of a tree of so many levels are at most about 1.3 times as far from the solid, in volume outside it (all of
+/// their union, if the mesh encloses nothing), as the set that `ellipsoids` finds for their number.
+///
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
 /// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
