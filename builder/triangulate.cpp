@@ -175,10 +175,11 @@ private:
             for (uint32_t y = cell(y_low, low_.y, high_.y); y <= last_y; ++y)
                 for (const uint32_t w : in_cell_[size_t{x} * cells_ + y]) {
                     if (!alive_[w] || w == p || w == q || w == r) continue;
-                    if (enters(w, a, b, c)) return false;
-                    is_touched |= at_[w] == b;
+                    const Place place = place_of(w, a, b, c);
+                    if (place == Place::enters) return false;
+                    is_touched |= place == Place::touches;
                 }
-        // Where the border comes by twice, both triangles there may turn left, and one of them be outside.
+        // Where the border comes by twice, a triangle may turn left, have nothing in it, and yet be outside.
         return !is_touched || winding((double{a.x} + b.x + c.x) / 3, (double{a.y} + b.y + c.y) / 3, q) > 0;
     }
     // Of the border that is left, around a point.
@@ -195,18 +196,19 @@ private:
         } while (i != first);
         return number;
     }
-    // Does an edge at corner w pass through the inside of the triangle a, b, c?
-    bool enters(uint32_t w, const Flat& a, const Flat& b, const Flat& c) const {
+    // Does an edge at corner w pass through the inside of the triangle a, b, c? Or does it touch its border?
+    enum class Place { away, touches, enters };
+    Place place_of(uint32_t w, const Flat& a, const Flat& b, const Flat& c) const {
         const int ab = turn(a, b, at_[w]), bc = turn(b, c, at_[w]), ca = turn(c, a, at_[w]);
-        if (ab < 0 || bc < 0 || ca < 0) return false;
-        if (ab > 0 && bc > 0 && ca > 0) return true;
+        if (ab < 0 || bc < 0 || ca < 0) return Place::away;
+        if (ab > 0 && bc > 0 && ca > 0) return Place::enters;
         for (const uint32_t n :
              {previous_[w], next_[w]}) { // on the border: it does if a neighbour is on the inner side
             const bool inner = (ab > 0 || turn(a, b, at_[n]) > 0) && (bc > 0 || turn(b, c, at_[n]) > 0) &&
                                (ca > 0 || turn(c, a, at_[n]) > 0);
-            if (inner) return true;
+            if (inner) return Place::enters;
         }
-        return false;
+        return Place::touches;
     }
 
     // The corner with the least triangle.

@@ -55,7 +55,8 @@ void expect_tiled(const Polygon& flat, bool turn = true) {
             std::vector<uint32_t> corners(p.size());
             std::iota(corners.begin(), corners.end(), 0u);
             std::vector<Triangle> triangles;
-                ASSERT_TRUE(triangulate(points, corners, triangles)) << testing::PrintToString(flat) << backwards << axis << turn;
+            ASSERT_TRUE(triangulate(points, corners, triangles))
+                << testing::PrintToString(flat) << backwards << axis << turn;
             ASSERT_EQ(triangles.size(), p.size() - 2);
             std::array<double, 3> sum{};
             double sizes = 0;
@@ -126,8 +127,9 @@ TEST(Triangulate, PolygonsThatTouchThemselves) {
     const Polygon ring = {{0, 0}, {6, 0}, {6, 6}, {0, 6}, {0, 0}, {2, 2}, {2, 4}, {4, 4}, {4, 2}, {2, 2}};
     EXPECT_EQ(area(ring), 32);
     expect_tiled(ring, false), expect_tiled(ring);
-    const Polygon two = {{0, 0}, {9, 0}, {9, 5}, {4, 5}, {4, 4}, {3, 4}, {3, 3}, {4, 3}, {4, 4},
+    const Polygon two = {{0, 0}, {9, 0}, {9, 5}, {4, 5}, {4, 4}, {4, 3}, {3, 3}, {3, 4}, {4, 4},
                          {4, 5}, {0, 5}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1}};
+    EXPECT_EQ(area(two), 43);
     expect_tiled(two, false), expect_tiled(two);
     expect_tiled({{0, 0}, {4, 0}, {4, 4}, {2, 0}, {0, 4}});                // a reflex corner on the opposite edge
     expect_tiled({{0, 0}, {2, 2}, {4, 0}, {4, 4}, {2, 2}, {0, 4}}, false); // two triangles that meet in a point

@@ -79,12 +79,12 @@ uint64_t hash(MeshView mesh) noexcept;
 /// How load_mesh() takes a file's coordinates.
 struct ImportOptions {
     /// Metres of one of the file's units, above 0. None: as its format defines it (3MF; glTF has metres), else 1.
-    std::optional<double> unit;
+    std::optional<double> unit = {};
     std::array<double, 3> scale = {1, 1, 1}; ///< factors along the axes, besides: finite, not 0
     /// Move the mesh's middle near (0, 0, 0), in double precision: what a mesh far away needs. Placement::origin then
     /// says from where, in whole steps of a power of two.
     bool recentre = false;
-    std::optional<std::array<double, 3>> origin; ///< the same to a known place
+    std::optional<std::array<double, 3>> origin = {}; ///< the same to a known place
 };
 
 /// Options that take the file just as `placement` says, whatever its format defines.
