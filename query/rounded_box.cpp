@@ -1,6 +1,7 @@
 #include "query/rounded_box.hpp"
 
 #include "query/convert.hpp"
+#include "query/limits.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -196,14 +197,14 @@ bool parts_by_features(const PlacedTriangle& triangle, const RoundedBox& box, do
 
 RoundedBox place(const Sphere& sphere, const Pose& pose, double margin) noexcept {
     const RelativePose to_frame = relative_pose(pose, {sphere.center, {}});
-    const double radius = sphere.radius + margin;
+    const double radius = sound_length(double{sphere.radius}) + margin;
     return {to_frame.translation, dmat3(1), dvec3(0), radius, to_frame.distance + radius};
 }
 
 RoundedBox place(const Capsule& capsule, const Pose& pose, double margin) noexcept {
     const RelativePose to_frame = relative_pose(pose, {capsule.a, {}});
     const dvec3 half = to_frame.rotation * (0.5 * (to_double(capsule.b) - to_double(capsule.a)));
-    const double radius = capsule.radius + margin, length = glm::length(half);
+    const double radius = sound_length(double{capsule.radius}) + margin, length = glm::length(half);
     return {to_frame.translation + half,
             frame_along(half),
             {length, 0, 0},
@@ -213,7 +214,8 @@ RoundedBox place(const Capsule& capsule, const Pose& pose, double margin) noexce
 
 RoundedBox place(const Box& box, const Pose& pose, double margin) noexcept {
     const RelativePose to_frame = relative_pose(pose, box.pose);
-    const dvec3 half = to_double(box.half);
+    const dvec3 half(sound_length(double{box.half.x}), sound_length(double{box.half.y}),
+                     sound_length(double{box.half.z}));
     return {to_frame.translation, to_frame.rotation, half, margin,
             to_frame.distance + half.x + half.y + half.z + margin};
 }

@@ -26,7 +26,7 @@ public:
           q_(ellipsoid.factor * glm::transpose(ellipsoid.factor)), to_ball_(glm::inverse(ellipsoid.factor)) {}
 
     void run() {
-        if (face_settles()) return;
+        if (face_pierces() || face_settles()) return;
         for (size_t i = 0; i < 3; ++i)
             if (edge_settles(p_[i], p_[(i + 1) % 3])) return;
     }
@@ -65,6 +65,19 @@ private:
     }
     bool at(const dvec3& x, const dvec3& n) { return settles(x, farthest(n), n); }
 
+    // Does the face hold a point of the ellipsoid? Where that is the unit ball, the one nearest to its center.
+    bool face_pierces() {
+        const dvec3 from = to_ball_ * p_[0], e = to_ball_ * (p_[1] - p_[0]), f = to_ball_ * (p_[2] - p_[0]);
+        const dvec3 n = glm::cross(e, f);
+        const double square = glm::dot(n, n), height = glm::dot(n, from);
+        if (!(height * height <= square)) return false;
+        const dvec3 foot = n * (height / square) - from;
+        const double s = glm::dot(glm::cross(foot, f), n) / square, t = glm::dot(glm::cross(e, foot), n) / square;
+        if (!(s >= 0 && t >= 0 && s + t <= 1)) return false;
+        const dvec3 x = p_[0] + s * (p_[1] - p_[0]) + t * (p_[2] - p_[0]);
+        settles(x, x, {1, 0, 0});
+        return true;
+    }
     bool face_settles() {
         const dvec3 e = p_[1] - p_[0], f = p_[2] - p_[0];
         dvec3 n = glm::cross(e, f);

@@ -140,7 +140,7 @@ public:
 
 private:
     bool apart(uint32_t i, uint32_t j) {
-        return collide(a_.ellipsoid(i), q_.a, b_.ellipsoid(j), q_.b) == Verdict::separated;
+        return collide(a_.bound(i), q_.a, b_.bound(j), q_.b) == Verdict::separated;
     }
     std::vector<uint32_t> below(const TreeView& tree, uint32_t node, uint32_t level) const {
         const ChildRange children = level >= max_level_ ? ChildRange{} : tree.children(node);
