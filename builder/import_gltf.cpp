@@ -8,13 +8,24 @@
 #include "builder/polygons.hpp"
 
 #include <nlohmann/json.hpp>
+
+#include <fstream> // which tiny_gltf.h needs, but does not include without its own file functions
+
+// Compiled in here, as Debian's README.Debian offers: the layout of its shared library's classes is not that of the
+// header (2.7.0+dfsg-2). Under a name of its own, so that a program may have another tinygltf.
+#define tinygltf prolate_tinygltf
+#define TINYGLTF_IMPLEMENTATION
+#define TINYGLTF_NO_INCLUDE_JSON
+#define TINYGLTF_NO_EXTERNAL_IMAGE
+#define TINYGLTF_NO_STB_IMAGE
+#define TINYGLTF_NO_STB_IMAGE_WRITE
+#define TINYGLTF_NO_FS
 #include <tiny_gltf.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <utility>

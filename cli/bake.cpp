@@ -18,7 +18,10 @@ Give at most one of --levels, --ellipsoids, and --tolerance or --distance or bot
 than that volume and that distance.
 With --exact the tree goes down to the triangles and keeps them, a few in each leaf: its ellipsoids cover the surface
 only and cull, and queries answer as the triangles do. 100,000 triangles take about a second, whatever the quality.
-Coordinates and lengths are in the mesh's own unit. The same mesh and options give the same bytes.
+Coordinates are the file's own, taken as metres, unless --unit or --scale says more; a 3MF's unit is applied, a DAE's only
+told. The tree keeps scale and local origin, and answers of queries are relative to it. Vertices that nearly meet are joined
+if that closes the mesh (--weld 0: never), and the cover holds them where they stood. Closed parts that are inside out are
+turned. The same mesh and options give the same bytes.
 An open mesh has no certain inside: it is baked in surface mode, where the cover of its triangles is guaranteed.
 
 What is not done twice: if the output file already is what this mesh and these options make, it is left as it is
@@ -47,6 +50,8 @@ Examples:
   prolate bake horse.obj -o horse.etree --ellipsoids 200 --quality best --report horse.json
   prolate bake horse.obj -o horse.etree --tolerance 0.1
   prolate bake horse.obj -o horse.etree --exact
+  prolate bake part.dae -o part.etree --unit mm
+  prolate bake site.obj -o site.etree --recentre
   prolate bake horse.obj -o - | ssh robot 'cat > horse.etree'
   prolate bake --manifest assets.json
   prolate bake --manifest assets.json --cache ~/.cache/prolate --json | jq '.assets[] | select(.error)')";

@@ -228,7 +228,7 @@ TEST_F(Cli, BakeReportsEachLevel) {
     EXPECT_EQ(levels, 3);
     EXPECT_EQ(baked_err_.find('\r'), std::string::npos) << "no progress line where stderr is no terminal";
     // 6 sides of 8 x 8 squares, whose points are shared: 6 * 8 * 8 + 2 points, 2 triangles and 4 corners a square.
-    EXPECT_NE(baked_err_.find("768 triangles on 386 distinct vertices (2,304 as read)"), std::string::npos)
+    EXPECT_NE(baked_err_.find("768 triangles on 386 distinct vertices (386 as read), box "), std::string::npos)
         << baked_err_;
 
     const Json report = Json::parse(read(shared("report.json")));
@@ -389,7 +389,7 @@ TEST_F(Cli, OneTriangleIsALegalOpenMesh) {
     const Outcome o = run({"bake", file("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "-o", file("one.etree"),
                            "--levels", "1", "--quality", "fast"});
     EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.err.find("3 open edges: no inside can be promised, baked in surface mode"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("3 open edges: no inside can be promised, surface mode"), std::string::npos) << o.err;
     EXPECT_EQ(run({"verify", file("one.etree"), file("one.obj")}).code, 0);
     EXPECT_NE(run({"info", file("one.etree")}).out.find("surface mode"), std::string::npos);
 }

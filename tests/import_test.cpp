@@ -610,6 +610,7 @@ TEST_F(Import, GltfExtensionsThatAreNotReadAreNamed) {
     EXPECT_EQ(load(with("KHR_texture_basisu")).triangles.size(), 1u);
     // Compressed without being required, and with nothing to fall back on.
     Gltf h;
+    h.view(std::vector<float>{0, 0, 0});
     h.raw_accessor(Gltf::words(5126, 3, "VEC3"));
     expect_refused(write("y.gltf", h.file(R"({"attributes":{"POSITION":0}})", R"([{"mesh":0}])", "")),
                    ErrorCode::bad_file, "without data");
