@@ -29,12 +29,14 @@ constexpr double kMostShareOfAll = 2.0 / 3; // degree + 1 parts have less: such 
 constexpr size_t kMostUnits = 512;          // that merge into the groups of a node; of more leaves, some are one unit
 constexpr double kReheat = 10;              // kappa at the start of a cycle
 constexpr int kRounds = 12;                 // at most, of a search for the count that meets a limit
+constexpr double kLeastWorth = 0.5;         // of a further leaf, in means of those that are there
 constexpr double kMet = 0.999;              // of a limit: quantisation will add a little
 constexpr double kCountTolerance = 1.1;     // the search ends this close to the least count
 constexpr double kLeastGain = 0.999;        // a level must bring the outside volume down to less than this much
 // What a tree's leaves may have outside, times what as many have that nothing above them limits. build.hpp
 // promises 1.3; the rest is for what is estimated on the way.
 constexpr double kMostLoss = 1.27;
+constexpr double kMostFewer = 1.25;   // leaves; with fewer still, there is room for more
 constexpr double kMostSettling = 1.4; // a set that all but covers seldom gains more volume when it has to cover
 
 class Grower {
@@ -66,6 +68,7 @@ private:
     struct Leaf {
         Fit fit;
         std::vector<uint32_t> pieces;
+        uint32_t parent = 0; // among those of its task
     };
     // A set of ellipsoids that all but covers, as descents leave it.
     struct Approach {
@@ -74,11 +77,10 @@ private:
     };
     // One that covers.
     struct Solved {
-        EllipsoidSet set;
-        std::vector<Leaf> leaves;  // one for each of the set; those that the others make redundant own nothing
-        size_t count = 0;          // that own something
-        double outside = HUGE_VAL; // of these, cubic metres
-        double settling = 1;       // times the volume outside before it was made to cover
+        std::vector<Leaf> leaves;
+        std::vector<std::vector<Fit>> chains; // as the task's, perhaps larger
+        double outside = HUGE_VAL;            // cubic metres
+        double settling = 1;                  // times the volume outside before it was made to cover
     };
     // What a set is made for: some parents, each with its cells and the number of children it is to have.
     struct Task {
@@ -99,10 +101,15 @@ private:
     }
 
     // Thin solids, and surfaces that enclose none, are measured by their area.
+    double scale_by_volume(size_t count) const {
+        return kShapeScale * std::cbrt(solid_volume_ / static_cast<double>(count));
+    }
+    double scale_by_area(size_t count) const {
+        return kThinShapeScale * std::sqrt(solid_.area / static_cast<double>(count));
+    }
+    bool thin(size_t count) const { return scale_by_area(count) > scale_by_volume(count); }
     Objective objective(size_t count) const {
-        const double n = static_cast<double>(count);
-        const double scale =
-            std::max(kShapeScale * std::cbrt(solid_volume_ / n), kThinShapeScale * std::sqrt(solid_.area / n));
+        const double scale = std::max(scale_by_volume(count), scale_by_area(count));
         return {double{options_.build.alpha}, double{options_.build.beta}, scale};
     }
 
@@ -123,7 +130,7 @@ private:
     // --- one set ----------------------------------------------------------------------------------------------------
 
     Solved solve(const Task& task, const Effort& effort, const std::function<void(double)>& progress) {
-        return settle(approach(task, effort, progress));
+        return settle(task, approach(task, effort, progress));
     }
 
     Approach approach(const Task& task, Effort effort, const std::function<void(double)>& progress) {
@@ -151,22 +158,59 @@ private:
         return best;
     }
 
-    Solved settle(Approach approach) {
+    Solved settle(const Task& task, Approach approach) {
         if (cancelled()) return {};
-        refine_seams(pieces_, approach.set);
-        const std::vector<uint32_t> owner = polish_set(approach.set);
+        EllipsoidSet& set = approach.set;
+        refine_seams(pieces_, set);
+        const std::vector<uint32_t> owner = polish_set(set);
+        std::vector<std::vector<Leaf>> below(task.cells.size());
+        std::vector<Leaf> all(set.fits.size());
+        for (size_t i = 0; i < all.size(); ++i) all[i] = {set.fits[i], {}, set.parent.empty() ? 0 : set.parent[i]};
+        for (uint32_t piece = 0; piece < owner.size(); ++piece) all[owner[piece]].pieces.push_back(piece);
+        std::erase_if(all, [](const Leaf& leaf) { return leaf.pieces.empty(); });
+        const double outside = outside_of(fits_of(all));
+        // Places of those that were redundant go to halves, where one more is worth about as much as the others.
+        for (const Leaf& leaf : all) below[leaf.parent].push_back(leaf);
         Solved out;
-        out.set = std::move(approach.set);
-        out.leaves.resize(out.set.fits.size());
-        for (size_t i = 0; i < out.leaves.size(); ++i) out.leaves[i].fit = out.set.fits[i];
-        for (uint32_t piece = 0; piece < owner.size(); ++piece) out.leaves[owner[piece]].pieces.push_back(piece);
-        std::vector<Fit> needed;
-        for (const Leaf& leaf : out.leaves)
-            if (!leaf.pieces.empty()) needed.push_back(leaf.fit);
-        out.outside = outside_of(needed);
-        out.count = needed.size();
-        out.settling = out.outside / approach.error;
+        for (std::vector<Leaf>& leaves : below) {
+            halve(leaves, task.children, kLeastWorth * outside / static_cast<double>(all.size()));
+            std::ranges::move(leaves, std::back_inserter(out.leaves));
+        }
+        if (out.leaves.size() > all.size()) out.outside = outside_of(fits_of(out.leaves));
+        if (!(out.outside < outside)) out.leaves = std::move(all), out.outside = outside;
+        out.settling = outside / approach.error;
+        out.chains = std::move(set.chains);
         return out;
+    }
+
+    static std::vector<Fit> fits_of(std::span<const Leaf> leaves) {
+        std::vector<Fit> out;
+        out.reserve(leaves.size());
+        for (const Leaf& leaf : leaves) out.push_back(leaf.fit);
+        return out;
+    }
+
+    // Halves the leaf that sticks out most, and then the next, until there are `count`: only such as then stick out by
+    // at least `worth` cubic metres less.
+    void halve(std::vector<Leaf>& leaves, size_t count, double worth) const {
+        if (leaves.size() >= count) return;
+        std::vector<double> outside;
+        const auto look = [&](const Leaf& leaf) { return leaf.pieces.size() > 1 ? outside_volume_(leaf.fit) : -1; };
+        for (const Leaf& leaf : leaves) outside.push_back(look(leaf));
+        while (leaves.size() < count) {
+            const auto most = static_cast<size_t>(std::ranges::max_element(outside) - outside.begin());
+            if (outside.empty() || outside[most] < 0) return;
+            const Leaf whole = leaves[most];
+            const auto place = [&](uint32_t piece) { return pieces_.center(piece); };
+            const auto [a, b] = divide(whole.pieces, place, whole.pieces.size() / 2);
+            Leaf low{part_of(whole.fit, a), a, whole.parent}, high{part_of(whole.fit, b), b, whole.parent};
+            if (outside_volume_(low.fit) + outside_volume_(high.fit) + worth > outside[most]) {
+                outside[most] = -1;
+                continue;
+            }
+            outside[most] = look(low), outside.push_back(look(high));
+            leaves[most] = std::move(low), leaves.push_back(std::move(high));
+        }
     }
 
     double approximate_error(const EllipsoidSet& set) const {
@@ -298,9 +342,9 @@ private:
                 follow_cuts(grown_.nodes, piece_count);
                 continue;
             }
-            outside = solved.outside, count = solved.count, settling = solved.settling;
+            outside = solved.outside, settling = solved.settling, count = solved.leaves.size();
             if (count == 1) { // the root itself, a little better
-                grown_.nodes[0].fit = only_needed(solved);
+                grown_.nodes[0].fit = solved.leaves[0].fit;
                 follow_cuts(grown_.nodes, piece_count);
                 continue;
             }
@@ -315,18 +359,21 @@ private:
             const auto keep = [&](double free_outside, size_t free_count) {
                 if (level < levels) return kLeastGain * outside <= free_outside;
                 const double steepness = std::log(root_outside / free_outside) / std::log(free_count); // as errors fall
-                const double fewer = static_cast<double>(free_count) / static_cast<double>(count);
+                const double fewer = std::min(static_cast<double>(free_count) / static_cast<double>(count), kMostFewer);
                 return outside <= kMostLoss * free_outside * std::pow(fewer, std::clamp(steepness, 0.0, 1.0));
             };
             const uint32_t piece_count = pieces_.size();
             Effort effort = options_.effort;
             effort.starts = 1, effort.cycles = 0;
-            Approach free = approach(task_below({0}, levels), effort, step(most_nodes(levels)));
+            const Task task = task_below({0}, levels);
+            Approach free = approach(task, effort, step(most_nodes(levels)));
             if (cancelled()) return;
-            if (!keep(std::clamp(settling, 1.0, kMostSettling) * free.error, free.set.fits.size())) {
-                const Solved solved = settle(std::move(free));
+            const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
+            if (thin(task.children) ||
+                !keep(estimate, free.set.fits.size())) { // what thin parts are uncovered is not in it
+                const Solved solved = settle(task, std::move(free));
                 if (cancelled()) return;
-                if (keep(solved.outside, solved.count)) {
+                if (keep(solved.outside, solved.leaves.size())) {
                     follow_cuts(grown_.nodes, piece_count);
                 } else {
                     grown_.nodes.resize(1);
@@ -337,10 +384,6 @@ private:
             end_level(level);
         }
         grown_.goal_reached = level == levels;
-    }
-
-    static const Fit& only_needed(const Solved& solved) {
-        return std::ranges::find_if(solved.leaves, [](const Leaf& leaf) { return !leaf.pieces.empty(); })->fit;
     }
 
     // Of a level, by the degree.
@@ -390,18 +433,16 @@ private:
 
     // Makes nodes of the ellipsoids that own something, `levels` below `parents`. Returns the new leaves.
     std::vector<uint32_t> attach(const Solved& solved, const std::vector<uint32_t>& parents, uint32_t levels) {
-        for (size_t p = 0; p < solved.set.chains.size(); ++p) { // the polish may have enlarged them
+        for (size_t p = 0; p < solved.chains.size(); ++p) { // the polish may have enlarged them
             uint32_t node = parents[p];
-            for (const Fit& fit : solved.set.chains[p]) {
+            for (const Fit& fit : solved.chains[p]) {
                 if (fit.volume() > grown_.nodes[node].fit.volume()) grown_.nodes[node].fit = fit;
                 node = grown_.nodes[node].parent;
             }
         }
         std::vector<Group> groups(parents.size());
         for (size_t p = 0; p < parents.size(); ++p) groups[p].node = parents[p];
-        for (uint32_t i = 0; i < solved.leaves.size(); ++i)
-            if (!solved.leaves[i].pieces.empty())
-                groups[solved.set.parent.empty() ? 0 : solved.set.parent[i]].members.push_back(i);
+        for (uint32_t i = 0; i < solved.leaves.size(); ++i) groups[solved.leaves[i].parent].members.push_back(i);
         return grow_between(std::move(groups), solved.leaves, levels);
     }
 
@@ -452,22 +493,8 @@ private:
         task.cells = {all_cells()};
         std::vector<Leaf> leaves = solve(task, options_.effort, progress).leaves;
         if (cancelled()) return {};
-        std::erase_if(leaves, [](const Leaf& leaf) { return leaf.pieces.empty(); });
-        while (leaves.size() < count) {
-            // Some were redundant. Halve the largest, and then the next: the count is what was asked for.
-            const auto largest = std::max_element(leaves.begin(), leaves.end(), [](const Leaf& a, const Leaf& b) {
-                return (a.pieces.size() > 1 ? a.fit.volume() : 0) < (b.pieces.size() > 1 ? b.fit.volume() : 0);
-            });
-            if (largest->pieces.size() < 2) {
-                grown_.goal_reached = false;
-                break;
-            }
-            const auto place = [&](uint32_t piece) { return pieces_.center(piece); };
-            auto [a, b] = divide(largest->pieces, place, largest->pieces.size() / 2);
-            const Fit whole = largest->fit;
-            *largest = {part_of(whole, a), a};
-            leaves.push_back({part_of(whole, b), b});
-        }
+        halve(leaves, count, -HUGE_VAL); // the count is what was asked for
+        if (leaves.size() < count) grown_.goal_reached = false;
         return leaves;
     }
 
@@ -518,10 +545,7 @@ private:
             std::vector<Leaf> leaves = solve_flat(count, [&](double part) { report((round + part) / kRounds); });
             if (cancelled()) return {};
             if (!best.empty()) follow_cuts(best, piece_count);
-            std::vector<Fit> fits;
-            fits.reserve(leaves.size());
-            for (const Leaf& leaf : leaves) fits.push_back(leaf.fit);
-            const double now = excess(fits), most = static_cast<double>(best.size()); // 0: unknown
+            const double now = excess(fits_of(leaves)), most = static_cast<double>(best.size()); // 0: unknown
             const bool met = now <= kMet;
             if (met) {
                 best = std::move(leaves);
