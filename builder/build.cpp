@@ -339,6 +339,9 @@ private:
         const auto start = Clock::now();
         const auto proof = verify(tree, mesh_, options);
         if (!proof) return proof.error();
+        if (!proof->bounded)
+            return Error{ErrorCode::internal, "a bounding volume could not be proved; please report this mesh",
+                         proof->unbounded_node};
         uint64_t pieces = 0;
         for (const LevelProof& level : proof->levels) pieces += level.pieces;
         for (size_t l = 0; l < figures.size(); ++l) {

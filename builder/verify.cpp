@@ -8,8 +8,8 @@
 // around each point of the solid there is a box small enough for one of them, unless that point is on the very border
 // of all ellipsoids that contain it.
 //
-// A query reaches a node only through those above it. So "in a node" means: in its ellipsoid and in all of theirs,
-// which is convex, too.
+// A node stands for a part of the parts of those above it. So "in a node" means: in its ellipsoid and in all of theirs,
+// which is convex, too. That a query reaches it is for the bounding volumes to see to (verify_bounding.cpp).
 //
 // Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners
 // of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
@@ -24,6 +24,7 @@
 #include "builder/clip.hpp"
 #include "builder/fit.hpp"
 #include "builder/job.hpp"
+#include "builder/verify_bounding.hpp"
 #include "builder/verify_exact.hpp"
 #include "builder/winding.hpp"
 #include "src/hash.hpp"
@@ -408,7 +409,9 @@ Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::f
 
     const std::vector<Cell> cells = cut_space(surface, box);
     std::vector<Shape> all = shapes_of(tree, rounding);
-    report.covered = true;
+    const std::optional<uint32_t> unbounded = find_unbounded(tree);
+    report.bounded = !unbounded, report.unbounded_node = unbounded.value_or(0);
+    report.covered = report.bounded;
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
         std::vector<Shape> shapes;
         tree.for_each_in_cut(l, [&](uint32_t node) { shapes.push_back(all[node]); });

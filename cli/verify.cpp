@@ -36,6 +36,8 @@ std::string as_json(const VerifyReport& report, bool same_mesh) {
     out["surface_mode"] = report.surface_mode;
     out["exact"] = report.exact;
     out["same_triangles"] = report.exact ? nlohmann::ordered_json(report.same_mesh) : nullptr;
+    out["bounded"] = report.exact ? nullptr : nlohmann::ordered_json(report.bounded);
+    if (!report.bounded) out["unbounded_node"] = report.unbounded_node;
     out["baked_from_this_mesh"] = same_mesh;
     out["levels"] = nlohmann::ordered_json::array();
     for (const LevelProof& level : report.levels) {
@@ -71,6 +73,10 @@ std::string as_text(const VerifyReport& report) {
     if (report.exact)
         out += report.same_mesh ? "exact tree: its triangles are the mesh's\n"
                                 : "exact tree: its triangles are NOT the mesh's\n";
+    if (!report.bounded)
+        out += fmt::format("node {}: its bounding volume does NOT hold all ellipsoids below it, so queries may miss them; "
+                           "bake again\n",
+                           report.unbounded_node);
     if (report.surface_mode) out += "surface mode: the mesh is open, so its triangles were proved and no inside\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;

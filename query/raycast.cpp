@@ -199,11 +199,9 @@ namespace {
 
 using query::to_double, query::to_float;
 
-RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& given, QueryContext& context,
+RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
                    const QueryOptions& query_options, bool any, const float* growth = nullptr) {
     using glm::dvec3;
-    Ray ray = given;
-    if (std::isnan(ray.max_t)) ray.max_t = std::numeric_limits<float>::infinity();
     QueryOptions options = query::sound(query_options);
     options.margin = std::min(options.margin, std::numeric_limits<float>::max()); // an infinite one would make NaNs
     RaycastResult out;

@@ -517,6 +517,34 @@ Tree with_scaled(const TreeView& tree, uint32_t node, double by) {
     return std::move(*out);
 }
 
+TEST(Verify, FailsWhenABoundingVolumeHoldsTooLittle) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
+    const Build built = must_build(mesh, quick());
+    const TreeView tree = built.tree.view();
+    const auto report = verify(tree, mesh.view());
+    ASSERT_TRUE(report);
+    EXPECT_TRUE(report->covered && report->bounded);
+    const auto with = [&](size_t at, int more) { // a byte of the root's bounding block
+        std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
+        std::byte& byte = bytes[static_cast<size_t>(tree.bounding_block(0) - tree.bytes().data()) + at];
+        byte = static_cast<std::byte>(static_cast<int>(byte) + more);
+        const auto changed = TreeView::open(bytes, {.check_hash = false});
+        EXPECT_TRUE(changed);
+        return *verify(*changed, mesh.view());
+    };
+    const std::pair<size_t, int> changes[] = {{49, -2},    // l11 of the root: 2 % less
+                                              {1, 2},      // its center
+                                              {192, 2},    // its box, from below
+                                              {216, -2}};  // and from above
+    for (const auto& [at, more] : changes) {
+        const VerifyReport smaller = with(at, more);
+        EXPECT_FALSE(smaller.bounded) << at;
+        EXPECT_FALSE(smaller.covered) << at;
+        EXPECT_EQ(smaller.unbounded_node, 0u) << at;
+        for (const LevelProof& level : smaller.levels) EXPECT_TRUE(level.covered) << at; // the ellipsoids are the same
+    }
+}
+
 TEST(Verify, FailsWhenOneEllipsoidShrinksByOnePercent) {
     const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
     const Build built = must_build(mesh, quick());

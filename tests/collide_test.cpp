@@ -177,7 +177,12 @@ TEST(Collide, EqualsBruteForce) {
                 const Query q = poses(random, 2.5);
                 const uint32_t max_level = random.below(4) ? kMaxLevels : random.below(5);
                 const CollideResult result = ask(a, b, q, {.max_level = max_level});
-                ASSERT_EQ(result.verdict == Verdict::overlapping, BruteForce(a, b, q, max_level).meets());
+                const bool meet = BruteForce(a, b, q, max_level).meets();
+                if (max_level == kMaxLevels) {
+                    ASSERT_EQ(result.verdict == Verdict::overlapping, meet);
+                } else if (result.verdict == Verdict::overlapping) { // boxes, which it leaves out, may part more
+                    ASSERT_TRUE(meet);
+                }
                 ++queries, apart += result.verdict == Verdict::separated;
             }
     EXPECT_GT(apart, queries / 4);
@@ -293,27 +298,6 @@ TEST(Collide, DeeperNeverRevokesSeparated) {
                 gained += shallow != before;
             }
     EXPECT_GT(gained, 50u);
-}
-
-// A prefix decides on its last level as on leaves, max_level does not look so closely.
-TEST(Collide, APrefixSeparatesWhatMaxLevelDoes) {
-    Random random(29);
-    const Scene a = make(random, {.levels = 4, .stop_probability = 0.2}), b = make(random, {.degree = 3, .levels = 4});
-    uint32_t separated = 0;
-    for (uint32_t level = 0; level < 4; ++level) {
-        const auto prefix = [&](const Scene& s) {
-            const uint64_t end = view(s).level(std::min(level, view(s).level_count() - 1)).end_byte;
-            return Scene{s.points, {s.bytes.begin(), s.bytes.begin() + static_cast<ptrdiff_t>(end)}};
-        };
-        const Scene short_a = prefix(a), short_b = prefix(b);
-        for (int i = 0; i < 100; ++i) {
-            const Query q = poses(random, 2.5);
-            if (ask(a, b, q, {.max_level = level}).verdict != Verdict::separated) continue;
-            ASSERT_EQ(ask(short_a, short_b, q).verdict, Verdict::separated);
-            ++separated;
-        }
-    }
-    EXPECT_GT(separated, 40u);
 }
 
 TEST(Collide, ABudgetIsKeptAndNeverLies) {

@@ -1,14 +1,13 @@
 // Where does a ray first meet a body?
 //
 // query.hpp says what the verdicts certify, the ray in the place of the second body:
-//  - separated:   no point of the ray lies in the solid that a tree without triangles covers, nor on a triangle of an
-//                 exact tree; with a margin, none comes as near to it as that.
+//  - separated:   no point of the ray lies in a leaf ellipsoid of a tree without triangles, nor on a triangle of an exact
+//                 tree; with a margin, none comes as near to it as that.
 //  - overlapping: the ray meets a leaf ellipsoid, or a triangle, or comes nearer to it than rounding error can tell
 //                 apart (about 1e-12 of the lengths that enter: the body's size and the distance of the ray's origin).
 //                 So a ray through an edge or a vertex never slips through, and one in the plane of a triangle meets it
 //                 at its rim.
 //  - undecided:   the budget ran out before a hit was found; or the pose or the ray is not finite, or the direction 0.
-// A leaf ellipsoid may stick out of the nodes above it, where the solid does not reach: such parts may count or not.
 // Exact trees are met at their triangles only, from either side, wherever the ray begins.
 #pragma once
 
@@ -21,7 +20,7 @@
 namespace prolate {
 
 /// The points origin + t direction, 0 <= t <= max_t, in the world. `direction` may have any length but 0; t counts in
-/// multiples of it, so a unit vector makes it metres.
+/// multiples of it, so a unit vector makes it metres. A negative max_t leaves no ray.
 struct Ray {
     Vec3 origin;
     Vec3 direction{0, 0, 1};
@@ -50,7 +49,8 @@ struct RaycastResult {
 
 /// First hit of the ray with the body, or where it first comes as near as options.margin: what a ball of this radius
 /// meets that flies along it. A ray that begins so near, or inside a leaf ellipsoid, hits it at t = 0. Nodes at
-/// options.max_level count as solid ellipsoids. Nodes are visited nearest first, and not at all beyond the best hit.
+/// options.max_level count as the ellipsoids that hold all below them. Every margin has an answer (query.hpp): with an
+/// infinite one or NaN, all rays hit at t = 0. Nodes are visited nearest first, and not at all beyond the best hit.
 /// Thread-safe on shared trees. The descent is told in query/raycast.cpp, the tests in query/ray.hpp.
 RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
                       const QueryOptions& options = {}) noexcept;

@@ -12,7 +12,8 @@
 
 namespace prolate {
 
-/// All shapes are placed in the world. Lengths in metres; radii and half extents may be 0, but not negative.
+/// All shapes are placed in the world. Lengths in metres; radii and half extents may be 0. Negative ones count as 0; with
+/// infinite or NaN ones, or any other number that is not finite, a shape overlaps all.
 struct Sphere {
     Vec3 center;
     float radius = 1;
@@ -28,7 +29,7 @@ struct Box {
     Vec3 half{1, 1, 1};
 };
 /// All points whose height along `normal` is at most `offset`. The normal is made a unit vector first, in double
-/// precision, so its length need not be exactly 1; it must not be 0.
+/// precision, so its length need not be exactly 1. With a normal of 0, it overlaps all.
 struct HalfSpace {
     Vec3 normal{0, 0, 1};
     float offset = 0;

@@ -41,9 +41,10 @@ struct SweepOptions {
     /// Look no deeper than this level of either tree (0 = roots only): the bodies are then its coarser covers, which
     /// meet no later.
     uint32_t max_level = kMaxLevels;
-    /// Stop before this many tests of nodes would be exceeded: QueryStats::pair_tests.
+    /// Stop before this many tests, of nodes and of triangles together, would be exceeded: QueryStats::tests(). Of two
+    /// leaves, as many must be left as they have pairs.
     uint64_t max_pair_tests = UINT64_MAX;
-    /// Inflate the bodies by this distance together, metres, >= 0.
+    /// Inflate the bodies by this distance together, metres. Negative counts as 0; infinite or NaN: they meet at once.
     float margin = 0;
 };
 
@@ -52,7 +53,9 @@ struct SweepResult {
     /// separated: the bodies stay farther apart than the margin all the time. overlapping: at time_upper they are not
     /// farther apart than margin + tolerance, and had not been before. undecided: a limit was reached first.
     Verdict verdict = Verdict::undecided;
-    bool enclosed = false; ///< overlapping at time 0 though no surfaces meet: a part of one body is inside the other
+    /// overlapping at time 0 though no surfaces meet, or none were found to within the budget: a part of one body is
+    /// inside the other
+    bool enclosed = false;
     /// Certified: at every time t < time_lower the solids are farther apart than the margin. 1 if separated.
     double time_lower = 0;
     /// A time when the bodies are within margin + tolerance; infinite if none is known. If overlapping, both times
@@ -71,7 +74,7 @@ struct SweepResult {
 /// above, in real numbers: what double precision rounds off is paid for. Symmetric: swapping the bodies swaps the
 /// answer. Thread-safe on shared trees. Of a body at rest, leave linear and angular 0.
 ///
-/// Anytime: with a larger max_pair_tests, time_lower never falls. A motion that is not finite, turns by more than
+/// Anytime: with a larger max_pair_tests, time_lower never falls, time_upper never rises, and a verdict stays. A motion that is not finite, turns by more than
 /// kMaxTurn, or starts with a quaternion of zero leaves everything open: undecided, time_lower = 0.
 ///
 /// Conservative advancement of pairs of nodes, each at its own pace, the earliest first: Mirtich 1996, Zhang et al.

@@ -20,9 +20,13 @@ struct LevelProof {
 };
 
 struct VerifyReport {
-    bool covered = false;      ///< every level is
+    bool covered = false;      ///< every level is, and if there is no triangle, `bounded`
     bool exact = false;        ///< the tree holds triangles
     bool same_mesh = true;     ///< of an exact tree: they are the mesh's. If not, no level counts as covered.
+    /// Of a tree without triangles: the bounding volumes hold all that lies below their nodes. If not, queries may
+    /// overlook it, and `unbounded_node` is the first node whose does not.
+    bool bounded = true;
+    uint32_t unbounded_node = 0;
     bool surface_mode = false; ///< the mesh is open: its triangles were proved, there is no inside
     std::vector<LevelProof> levels;
 };
@@ -38,8 +42,9 @@ struct VerifyOptions {
 /// Proves each level of `tree` by adaptive subdivision of space: a cell is done when all of the solid in it (triangles
 /// clipped to the cell, and its corners inside the solid) lies in one node of the *decoded* tree, because then, an
 /// ellipsoid being convex, everything in between does. To lie in a node is to lie in its ellipsoid and in those of all
-/// nodes above it, or queries would not get there. The mesh is given as it was read: it is welded as when the tree was
-/// baked, and where that moves points, they are proved where they stood. A point of the solid in no node ends the proof as a counterexample;
+/// nodes above it, which is more than queries need: they get there by the bounding volumes, which are proved to hold
+/// all ellipsoids below. The mesh is given as it was read: it is welded as when the tree was baked, and where that moves
+/// points, they are proved where they stood. A point of the solid in no node ends the proof as a counterexample;
 /// a cell that cannot be decided at 1e-9 of the mesh's size ends it as "not proved". Of an exact tree, the triangles
 /// are compared with the mesh's, and each is looked for in every ellipsoid above it. A prefix of one is proved to cover
 /// the triangles, as in surface mode. Thread-safe. Fails with bad_mesh or cancelled.
