@@ -1,5 +1,5 @@
 // Two threads write one number, unprotected, in a job on plain threads or on oneTBB's: what ThreadSanitizer has to
-// find, whatever it is told to overlook.    planted_race plain|tbb
+// find, or its silence about the rest means nothing.    planted_race plain|tbb
 #include "tests/threads.hpp"
 
 #include <prolate/tbb.hpp>
