@@ -360,7 +360,7 @@ Result<Build> build(MeshView mesh, const BuildOptions& options, const ProgressCa
         tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
         return arena.execute([&] { return Bake(options, progress).run(mesh); });
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::bad_mesh, "not enough memory; lower the quality, the count or the mesh's size", 0};
+        return Error{ErrorCode::out_of_memory, "there is not enough memory"};
     }
 }
 

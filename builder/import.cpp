@@ -245,7 +245,7 @@ Result<Mesh> load_mesh(const char* path, std::string* detail) {
         words.clear();
         return load_or_throw(path, words);
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::bad_file, "the mesh does not fit into memory"};
+        return Error{ErrorCode::out_of_memory, "the mesh does not fit into memory"};
     } catch (const std::exception& e) {
         try {
             words = e.what();

@@ -47,7 +47,7 @@ struct CleanMesh {
 
 /// Merges vertices of equal position, drops redundant triangles and unused vertices, and classifies the edges. What
 /// stays keeps its order. Fails with bad_mesh for no triangle with an area, an index out of range, or a coordinate that
-/// is not finite (`what` begins with "triangle" or "vertex", and `where` is its index). O(n log n). Thread-safe.
+/// is not finite (`what` begins with "triangle" or "vertex", `where` is its index); out_of_memory. O(n log n). Thread-safe.
 Result<CleanMesh> clean(MeshView mesh);
 
 /// XXH3-64 of vertices and triangles in their order. Of a cleaned mesh, it is what BakeInfo::source_hash holds.
@@ -56,7 +56,7 @@ uint64_t hash(MeshView mesh) noexcept;
 /// Reads every mesh of a scene, with its transforms, through Assimp: OBJ, PLY, STL, OFF, glTF/GLB, 3DS, DAE (by the
 /// name's extension). Polygons become triangles; points and lines are left out; mirroring transforms turn the winding.
 /// Coordinates stay as the file has them: a stated unit or up axis (DAE, 3DS) is not applied.
-/// Fails with io (`where` is errno) or bad_file; `detail`, if given, then receives particulars, such as the reader's
+/// Fails with io (`where` is errno), out_of_memory or bad_file; `detail`, if given, then receives the reader's
 /// own words. The mesh is not cleaned yet. Thread-safe.
 Result<Mesh> load_mesh(const char* path, std::string* detail = nullptr);
 
