@@ -383,7 +383,7 @@ Result<Build> build(MeshView mesh, const BuildOptions& options, const ProgressCa
     } catch (const Cancelled&) {
         return Error{ErrorCode::cancelled, "cancelled", 0};
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::bad_mesh, "not enough memory; lower the quality, the count or the mesh's size", 0};
+        return Error{ErrorCode::out_of_memory, "there is not enough memory"};
     }
 }
 

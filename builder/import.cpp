@@ -276,7 +276,7 @@ Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportRep
         out = {};
         return load_or_throw(path, options, out);
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::bad_file, "the mesh does not fit into memory"};
+        return Error{ErrorCode::out_of_memory, "the mesh does not fit into memory"};
     } catch (const std::exception& e) {
         try {
             out.detail = e.what();

@@ -286,7 +286,7 @@ Result<CleanMesh> clean(MeshView mesh, float weld) {
     } catch (const std::bad_alloc&) {
     } catch (const std::length_error&) {
     }
-    return Error{ErrorCode::bad_mesh, "the mesh does not fit into memory"};
+    return Error{ErrorCode::out_of_memory, "the mesh does not fit into memory"};
 }
 
 uint64_t hash(MeshView mesh) noexcept {

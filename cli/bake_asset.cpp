@@ -2,6 +2,7 @@
 
 #include "cli/common.hpp"
 #include "cli/levels.hpp"
+#include "cli/progress_line.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -10,24 +11,13 @@
 #include <filesystem>
 #include <utility>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+
 namespace prolate::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A bake can take long: knows first that there is a place for its result, and that it is not the input.
-int check_files(const Asset& a) {
-    std::error_code none;
-    for (const std::string& output : {a.output, a.report})
-        if (!output.empty() && fs::equivalent(output, a.mesh, none))
-            return complain(kUsage, output, "is the input itself", "name another output");
-    if (!a.report.empty() && a.report == a.output)
-        return complain(kUsage, a.report, "is named for the tree and for the report", "name two files");
-    for (const std::string& output : {a.output, a.report})
-        if (!output.empty())
-            if (const int code = check_output(output); code != kDone) return code;
-    return kDone;
-}
 
 // The tree in the output file, if there is one to be looked at.
 std::optional<Tree> old_output(const Asset& a) {
@@ -46,19 +36,18 @@ std::optional<Baked> reuse(std::optional<Tree>& old, const BakeCache& cache, uin
 }
 
 // Reuses or bakes; writes nothing but cache entries.
-std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const std::string& label, int& code) {
+std::optional<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::string& label, int& code) {
     const auto options = options_of(a, code);
     if (!options) return {};
     const auto import = import_options(a.mesh_options, code);
     if (!import) return {};
-    if (code = check_files(a); code != kDone) return {};
     const uint64_t key = hash(*options);
-    std::optional<Tree> old = force ? std::nullopt : old_output(a);
+    std::optional<Tree> old = rebake ? std::nullopt : old_output(a);
 
     // The file's bytes say which mesh it is, if they have been seen before.
     std::optional<uint64_t> file;
     if (cache) file = hash_mesh_file(a.mesh.c_str(), *import);
-    if (file && !force)
+    if (file && !rebake)
         if (const auto seen = cache.find_source(*file))
             if (auto baked = reuse(old, cache, *seen, key)) return baked;
 
@@ -71,7 +60,7 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const st
         const uint64_t source = hash(cleaned->mesh.view());
         // Remembered only if the file was the same before and after it was read.
         if (file && *file == hash_mesh_file(a.mesh.c_str(), *import)) cache.keep_source(*file, source);
-        if (!force)
+        if (!rebake)
             if (auto baked = reuse(old, cache, source, key)) {
                 baked->diagnosis = cleaned->report;
                 return baked;
@@ -93,7 +82,7 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const st
 } // namespace
 
 void declare_asset_options(CLI::App& app, Asset& a) {
-    app.add_option("mesh", a.mesh, "the mesh: OBJ, PLY, STL, OFF, glTF, GLB, 3MF, 3DS or DAE");
+    app.add_option("mesh", a.mesh, "the mesh: OBJ, PLY, STL, OFF, glTF, GLB, 3MF, 3DS or DAE; - for standard input");
     app.add_option("-o,--output", a.output, "the .etree file to write, or - for standard output");
     declare_mesh_options(app, a.mesh_options);
     app.add_option("--weld", a.mesh_options.weld,
@@ -112,7 +101,7 @@ void declare_asset_options(CLI::App& app, Asset& a) {
     app.add_flag("--exact", a.options.exact, "keep the triangles, in the leaves: queries answer as they do");
     app.add_option("--leaf-triangles", a.options.leaf_triangles, "most triangles in a leaf, 1 ... 127; with --exact")
         ->capture_default_str();
-    app.add_option("--threads", a.options.threads, "0 = all cores; the result does not depend on it")
+    app.add_option("-j,--threads", a.options.threads, "0 = all cores; the result does not depend on it")
         ->capture_default_str();
     app.add_option("--seed", a.options.seed, "of all that is drawn at random")->capture_default_str();
     app.add_option("--report", a.report, "also write all figures to this JSON file");
@@ -169,19 +158,34 @@ std::optional<BuildOptions> options_of(const Asset& a, int& code) {
     return options;
 }
 
-std::optional<Baked> bake_asset(const Asset& a, BakeCache& cache, bool force, const std::string& label, int& code) {
+void name_inputs(const Asset& a, Outputs& outputs, const std::string& whose) {
+    outputs.reads(a.mesh, "the mesh" + whose);
+}
+
+int claim_outputs(const Asset& a, Outputs& outputs, const std::string& whose) {
+    const int code = outputs.claim(a.output, "the output" + whose, "etree");
+    return code == kDone ? outputs.claim(a.report, "the report" + whose, "json") : code;
+}
+
+std::optional<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cache, bool rebake,
+                                const std::string& label, int& code) {
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
-    auto baked = make(a, cache, force, label, code);
+    auto baked = make(a, cache, rebake, label, code);
     if (!baked) return {};
     if (!baked->tree.view().bake_info().goal_reached)
         note(a.mesh, "the asked number, tolerance or distance was not reached at this resolution; try --quality best");
-    if (baked->source != Source::unchanged)
-        if (code = write_output(a.output, baked->tree.bytes()); code != kDone) return {};
     cache.keep(baked->tree.view(), baked->source == Source::baked);
+    if (baked->source == Source::unchanged) {
+        // For make and its like, which go by dates. Whose file it is not may not do so, and loses nothing but that.
+        ::utimensat(AT_FDCWD, a.output.c_str(), nullptr, 0);
+    } else {
+        code = outputs.write(a.output, baked->tree.bytes(), cache ? Outputs::Effort::small : Outputs::Effort::long_);
+        if (code != kDone && cache) note(a.output, "the cache has the tree: the next run takes it from there");
+        if (code != kDone) return {};
+    }
     baked->seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    if (!a.report.empty())
-        if (code = write_output(a.report, text_of(report_of(a, *baked))); code != kDone) return {};
+    if (code = outputs.write(a.report, text_of(report_of(a, *baked))); code != kDone) return {};
     return baked;
 }
 

@@ -1,6 +1,8 @@
 // prolate export: the tree's ellipsoids for other programs.
 #include "cli/common.hpp"
 #include "cli/export_formats.hpp"
+#include "cli/outputs.hpp"
+#include "cli/view_option.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -38,19 +40,19 @@ hull of a whole file. With --no-outer, obj names each ellipsoid by its node. ply
 Colors are those of "prolate render": a hue for each child of the root, which all below it keep.
 
 Examples:
-  prolate export horse.etree -o horse.csv --level 2
+  prolate export horse.etree -o cover.csv --level 2
   prolate export horse.etree -o - --format csv | wc -l
-  prolate export horse.etree -o horse.glb --level 2
-  prolate export horse.etree -o horse.obj --segments 64
-  prolate export horse.etree -o horse.pov && povray +Ihorse.pov +W1200 +H900 +A0.1)";
+  prolate export horse.etree -o cover.glb --level 2
+  prolate export horse.etree -o cover.obj --segments 64
+  prolate export horse.etree -o cover.pov && povray +Icover.pov +W1200 +H900 +A0.1)";
 
 struct ExportArguments {
     std::string tree, output, format;
     std::optional<uint32_t> level;
     uint32_t segments = 32;
     std::optional<bool> outer;
-    std::vector<double> view = {View{}.azimuth, View{}.elevation};
-    std::string up = "y";
+    ViewWords view;
+    Outputs outputs;
 };
 
 void add_cut(const TreeView& tree, uint32_t level, Selection& to) {
@@ -80,34 +82,37 @@ Selection cut_at(const TreeView& tree, uint32_t level) {
     return out;
 }
 
-std::string picture(const TreeView& tree, std::string_view format, const ExportArguments& a) {
+std::string picture(const TreeView& tree, std::string_view format, const ExportArguments& a, const View& view) {
     const std::vector<Piece> pieces = pieces_of(tree, a.level.value_or(tree.level_count() - 1));
     const Facets facets = a.outer.value_or(format != "glb") ? Facets::outer : Facets::inscribed;
     if (format == "ply") return as_ply(pieces, a.segments, facets);
     if (format == "obj") return as_obj(pieces, a.segments, facets);
     if (format == "glb") return as_glb(pieces, a.segments, facets);
-    const auto axis = std::find(std::begin(kUpAxes), std::end(kUpAxes), a.up) - std::begin(kUpAxes);
-    return as_pov(pieces, {a.view[0], a.view[1], static_cast<UpAxis>(axis)});
+    return as_pov(pieces, view);
 }
 
-int run(const ExportArguments& a) {
+int run(ExportArguments& a) {
     const std::string format = a.format.empty() ? extension(a.output) : a.format;
     if (std::find(std::begin(kFormats), std::end(kFormats), format) == std::end(kFormats))
         return complain(kUsage, format.empty() ? a.output : format,
                         format.empty() ? "the format is not clear from the name" : "no such export format",
                         "use csv, json, ply, obj, glb or pov, as the extension or with --format");
-    int code = check_output(a.output);
-    if (code != kDone) return code;
+    int code = kDone;
+    const auto viewer = view_of(a.view, code);
+    if (!viewer) return code;
+    a.outputs.reads(a.tree, "the tree");
+    if (code = a.outputs.claim(a.output, "the output", format); code != kDone) return code;
     const auto tree = read_tree(a.tree, code);
     if (!tree) return code;
     const TreeView view = tree->view();
     if (a.level && *a.level >= view.level_count())
         return complain(kUsage, "--level", fmt::format("the tree has no level {}", *a.level),
                         fmt::format("its levels are 0 to {}", view.level_count() - 1));
-    if (format == "csv") return write_output(a.output, as_csv(view, a.level ? cut_at(view, *a.level) : all_cuts(view)));
+    if (format == "csv")
+        return a.outputs.write(a.output, as_csv(view, a.level ? cut_at(view, *a.level) : all_cuts(view)));
     if (format == "json")
-        return write_output(a.output, as_json(view, a.level ? cut_at(view, *a.level) : all_nodes(view)));
-    return write_output(a.output, picture(view, format, a));
+        return a.outputs.write(a.output, as_json(view, a.level ? cut_at(view, *a.level) : all_nodes(view)));
+    return a.outputs.write(a.output, picture(view, format, a, *viewer));
 }
 
 } // namespace
@@ -115,7 +120,7 @@ int run(const ExportArguments& a) {
 void add_export(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<ExportArguments>();
     CLI::App* command = app.add_subcommand("export", "Write a tree's ellipsoids as csv, json, ply, obj, glb or pov");
-    command->add_option("tree", a->tree, "the .etree file")->required();
+    command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_option("-o,--output", a->output, "the file to write, or - for standard output")->required();
     command->add_option("--format", a->format, "csv, json, ply, obj, glb or pov (default: the output's extension)");
     command->add_option("--level", a->level, "export the cut at this level, 0 = the root");
@@ -125,13 +130,8 @@ void add_export(CLI::App& app, Work& chosen) {
     command->add_flag_function(
         "--outer,!--no-outer", [a](int64_t count) { a->outer = count > 0; },
         "ply, obj, glb: triangles outside the ellipsoids, so that the meshes cover (default: not for glb)");
-    command
-        ->add_option("--view", a->view, "pov: where the viewer stands: azimuth and elevation, degrees (default: 30,18)")
-        ->delimiter(',')
-        ->expected(2);
-    command->add_option("--up", a->up, "pov: the model's axis that points up")
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
-        ->capture_default_str();
+    declare_view(*command, a->view, "pov: ");
+    a->outputs.declare(*command);
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }

@@ -1,5 +1,6 @@
 // csv and json: the nodes in full precision.
 #include "cli/export_formats.hpp"
+#include "cli/generator.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -50,6 +51,7 @@ std::string as_csv(const TreeView& tree, const Selection& selection) {
 
 std::string as_json(const TreeView& tree, const Selection& selection) {
     nlohmann::ordered_json out;
+    out["generator"] = generator();
     out["degree"] = tree.degree();
     out["levels"] = tree.level_count();
     out["precision"] = {{"center", "exact in single precision"},

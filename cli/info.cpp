@@ -45,7 +45,7 @@ std::string as_json(const TreeView& tree) {
 
 std::string as_text(const std::string& name, const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
-    std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", name, kFormatVersion,
+    std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", visible(name), kFormatVersion,
                                   grouped(tree.bytes().size()));
     if (tree.is_prefix()) out += "  a prefix of a longer file: a coarser tree\n";
     out += fmt::format("  nodes     {} in {} levels, degree {}; {} blocks, {:.1f} bytes a node\n",
@@ -97,7 +97,7 @@ int run(const InfoArguments& a) {
 void add_info(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<InfoArguments>();
     CLI::App* command = app.add_subcommand("info", "Show what an .etree file holds and how it was made");
-    command->add_option("tree", a->tree, "the .etree file")->required();
+    command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_flag("--json", a->json, "print JSON");
     command->footer(std::string(kLevelTableHelp) + kExamples);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

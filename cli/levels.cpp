@@ -1,5 +1,6 @@
 #include "cli/levels.hpp"
 
+#include "cli/generator.hpp"
 #include "cli/grouped.hpp"
 
 #include <fmt/format.h>
@@ -124,7 +125,9 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
 }
 
 std::string text_of(const nlohmann::ordered_json& json) {
-    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+    nlohmann::ordered_json out{{"generator", generator()}};
+    out.update(json);
+    return out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
 }
 
 const char* name_of(Method method) {

@@ -1,6 +1,8 @@
 // prolate verify: proves anew, from the file and the mesh alone, that every level of the tree covers.
 #include "cli/common.hpp"
 #include "cli/mesh_options.hpp"
+#include "cli/progress_line.hpp"
+#include "cli/threads.hpp"
 
 #include <prolate/verify.hpp>
 
@@ -83,6 +85,7 @@ std::string as_text(const VerifyReport& report) {
 }
 
 int run(const VerifyArguments& a) {
+    use_available_threads();
     int code = kDone;
     const auto tree = read_tree(a.tree, code);
     if (!tree) return code;
@@ -113,10 +116,10 @@ int run(const VerifyArguments& a) {
 void add_verify(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<VerifyArguments>();
     CLI::App* command = app.add_subcommand("verify", "Prove that every level of a tree covers a mesh");
-    command->add_option("tree", a->tree, "the .etree file")->required();
-    command->add_option("mesh", a->mesh, "the mesh that it should cover")->required();
+    command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
+    command->add_option("mesh", a->mesh, "the mesh that it should cover, or - for standard input")->required();
     declare_mesh_options(*command, a->mesh_options, true);
-    command->add_option("--threads", a->threads, "0 = all cores")->capture_default_str();
+    command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

@@ -1,8 +1,11 @@
 // prolate view: trees to look at, and to move against each other, as one page for a browser.
 #include "cli/common.hpp"
 #include "cli/mesh_options.hpp"
+#include "cli/outputs.hpp"
 #include "cli/pose.hpp"
+#include "cli/progress_line.hpp"
 #include "cli/render_panel.hpp"
+#include "cli/threads.hpp"
 #include "cli/view_scene.hpp"
 
 #include <prolate/version.hpp>
@@ -35,6 +38,7 @@ struct ViewArguments {
     std::vector<std::string> files;
     std::string output, up = "y", pose;
     MeshOptions mesh_options;
+    Outputs outputs;
 };
 
 bool is_tree(const std::string& path) {
@@ -62,7 +66,7 @@ struct Asset {
 std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& files) {
     std::vector<Asset> assets;
     for (const std::string& path : files) {
-        if (is_tree(path))
+        if (is_tree(path) || (assets.empty() && is_standard_input(path)))
             assets.push_back({path, "", {}, {}, true});
         else if (!assets.empty() && assets.back().mesh_path.empty())
             assets.back().mesh_path = path;
@@ -93,7 +97,8 @@ int read_asset(Asset& asset, const MeshOptions& mesh_options) {
     return kDone;
 }
 
-int run(const ViewArguments& a) {
+int run(ViewArguments& a) {
+    use_available_threads();
     if (const std::string kind = extension(a.output); !kind.empty() && kind != "html" && kind != "htm")
         return complain(kUsage, a.output, "view writes HTML files only", "end the name in .html");
     auto assets = sort_files(a.files);
@@ -112,7 +117,11 @@ int run(const ViewArguments& a) {
     if (two && !has_query_module())
         return complain(kUsage, "view", "this prolate was built without emscripten, so its pages cannot answer queries",
                         "view one tree, or install emscripten and build prolate again");
-    if (const int code = check_output(a.output); code != kDone) return code;
+    for (const Asset& asset : *assets) {
+        a.outputs.reads(asset.tree_path, "the tree");
+        a.outputs.reads(asset.mesh_path, "the mesh");
+    }
+    if (const int code = a.outputs.claim(a.output, "the page", "html"); code != kDone) return code;
 
     nlohmann::ordered_json scene{
         {"version", fmt::format("{}.{}.{}", PROLATE_VERSION_MAJOR, PROLATE_VERSION_MINOR, PROLATE_VERSION_PATCH)},
@@ -132,7 +141,7 @@ int run(const ViewArguments& a) {
         if (!body) return complain("view", Error{ErrorCode::cancelled});
         scene["bodies"].push_back(std::move(*body));
     }
-    return write_output(a.output, view_page(scene, numbers, two));
+    return a.outputs.write(a.output, view_page(scene, numbers, two), Outputs::Effort::long_);
 }
 
 } // namespace
@@ -149,6 +158,7 @@ void add_view(CLI::App& app, Work& chosen) {
     command->add_option("--up", a->up, "the models' axis that points up")
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
         ->capture_default_str();
+    a->outputs.declare(*command);
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }

@@ -14,6 +14,10 @@ if(PROLATE_BUILD_BUILDER)
 endif()
 if(PROLATE_BUILD_CLI)
   install(TARGETS prolate_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(FILES ${PROJECT_BINARY_DIR}/self/prolate.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  install(FILES ${PROJECT_BINARY_DIR}/self/bash RENAME prolate DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+  install(FILES ${PROJECT_BINARY_DIR}/self/zsh RENAME _prolate DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+  install(FILES ${PROJECT_BINARY_DIR}/self/fish RENAME prolate.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 endif()
 
 # All headers, but for the builder's where it is not built. eigen.hpp and tbb.hpp are for programs that have these.

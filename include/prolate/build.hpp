@@ -86,7 +86,7 @@ inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kTh
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
 /// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
-/// Fails with bad_options, unsupported, bad_mesh, cancelled, or internal. Thread-safe.
+/// Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 
 } // namespace prolate

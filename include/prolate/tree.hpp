@@ -269,8 +269,8 @@ public:
 Result<Tree> load(const char* path);
 
 /// Writes `bytes` to `path` so that an interruption at any moment leaves the old file or the new one, never a part:
-/// temporary file beside it, fsync, rename. An existing target that is not a regular file (a pipe, /dev/stdout) is
-/// written directly. Fails with io; `where` is then errno.
+/// temporary file beside it, fsync, rename. Symbolic links are followed. An existing target that is not a regular file
+/// (a pipe, /dev/stdout) is written directly. Fails with io; `where` is then errno.
 Result<void> save(const char* path, std::span<const std::byte> bytes);
 
 } // namespace prolate
