@@ -15,9 +15,9 @@ namespace {
 // Rounding takes care of ellipsoids with a larger axis ratio: half a step of the center, or of a long column of the
 // factor, may be a good part of their thin radius.
 constexpr double kThin = 16;
-constexpr int kTries = 300;        // integers above and below, for a column
-constexpr double kEnough = 5e-3;   // of the volume, what rounding a column may cost: the search ends
-constexpr double kWidening = 0.05; // of squared radii, at most, to make up for a center that is off
+constexpr int kTries = 300;         // integers above and below, for a column
+constexpr double kEnough = 5e-3;    // of the volume, what rounding a column may cost: the search ends
+constexpr double kWidening = 0.025; // of radii, to make up for a center that is off, if length can do more
 
 bool is_thin(const Fit& fit) {
     return fit.factor.norm() * fit.inverse.norm() > 3 * kThin; // of Frobenius norms: 3 for a ball
@@ -64,18 +64,29 @@ Vec nearest_integers(Mat basis, const Vec& target) {
     return out;
 }
 
-// The least ellipsoid about a lattice point that holds `fit`: a point that lies well for its thin axes.
-Fit about_lattice_point(const Fit& fit, const format::Lattice& lattice) {
+// An ellipsoid about a lattice point, one that lies well for the thin axes of `fit`, in place of it. It is longer along
+// the way that the center went, as far as that spares volume, or width, which costs more than thickness.
+Fit about_lattice_point(const Fit& fit, const format::Lattice& lattice,
+                        const std::function<double(const Fit&)>& reach_of) {
     const double step = power_of_two(lattice.step_exponent);
     const Vec origin(lattice.origin[0], lattice.origin[1], lattice.origin[2]);
     const Vec q = nearest_integers(step * fit.inverse, fit.center / step - origin);
     if ((q.array() < 0).any() || (q.array() > UINT16_MAX).any()) return fit;
-    const Vec center = step * (origin + q), off = fit.center - center;
-    // Of those of the shape (1 + p) Q + (1 + 1 / p) off off^T, all of which hold it, the one of least volume that is
-    // not much wider: thickness costs less.
-    const double m = fit.radial_squared(center), p = std::min((std::sqrt(m * m + 3 * m) - m) / 3, kWidening);
-    if (!(p > 0)) return {center, fit.factor};
-    return {center, cholesky((1 + p) * fit.factor * fit.factor.transpose() + (1 + 1 / p) * off * off.transpose())};
+    const Vec center = step * (origin + q), way = fit.center - center;
+    const double off = std::sqrt(fit.radial_squared(center));
+    Fit best(center, fit.factor);
+    if (off < kSlack) return best;
+    const double widest = (1 + kWidening) * reach_of(fit);
+    double reach = reach_of(best);
+    for (const double times : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0}) {
+        const double length = 1 + times * off;
+        const Fit longer(center, cholesky(fit.factor * fit.factor.transpose() +
+                                          (length * length - 1) / (off * off) * way * way.transpose()));
+        const double own = reach_of(longer);
+        if (reach > widest ? own < reach : own <= widest && longer.volume() * std::pow(own / reach, 3) < best.volume())
+            best = longer, reach = own;
+    }
+    return best;
 }
 
 // Rounds column c of the factor again. A longer or shorter column does little harm, one that points elsewhere may tilt
@@ -123,7 +134,7 @@ std::optional<format::PackedNode> covering_node(const Fit& given, const format::
                                                 const std::function<double(const Fit&)>& reach_of) {
     constexpr int kRounds = 64;
     const bool thin = is_thin(given);
-    const Fit fit = thin ? about_lattice_point(given, lattice) : given;
+    const Fit fit = thin ? about_lattice_point(given, lattice, reach_of) : given;
     double scale = thin ? reach_of(fit) / (1 - kSlack) : 1;
     for (int round = 0; round < kRounds; ++round) {
         const Fit wanted = fit.scaled(scale);

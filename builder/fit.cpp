@@ -122,11 +122,11 @@ double Fit::reach(std::span<const Vec> points) const {
     return std::sqrt(largest);
 }
 
-Fit capped(const Vec& center, const Mat& q, double min_radius) {
+Fit capped(const Vec& center, const Mat& q, double min_radius, double max_ratio) {
     const Eigen3x3 axes = eigen_of(q);
     double radii[3];
     for (size_t i = 0; i < 3; ++i) radii[i] = std::sqrt(std::max(axes.values[i], 0.0));
-    const double floor = std::max(min_radius, radii[0] / kMaxAxisRatio);
+    const double floor = std::max(min_radius, radii[0] / max_ratio);
     if (radii[2] >= floor) return {center, cholesky(q)};
     Mat widened = Mat::Zero();
     for (size_t i = 0; i < 3; ++i) {
@@ -137,13 +137,13 @@ Fit capped(const Vec& center, const Mat& q, double min_radius) {
     return {center, cholesky(widened)};
 }
 
-bool within_caps(const Fit& fit, double min_radius) {
+bool within_caps(const Fit& fit, double min_radius, double max_ratio) {
     // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
     const double inverse = fit.inverse.norm();
-    if (fit.factor.norm() * inverse <= kMaxAxisRatio && inverse * min_radius <= 1) return true;
+    if (fit.factor.norm() * inverse <= max_ratio && inverse * min_radius <= 1) return true;
     const Eigen3x3 axes = eigen_of(fit.factor * fit.factor.transpose());
     const double thinnest = axes.values[2] * (1 + 1e-6); // capped() itself gets there only up to rounding
-    return thinnest * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] && thinnest >= min_radius * min_radius;
+    return thinnest * max_ratio * max_ratio >= axes.values[0] && thinnest >= min_radius * min_radius;
 }
 
 Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double tolerance) {
@@ -228,7 +228,7 @@ Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double to
         const Vec d = lifted[i].head<3>() - mean;
         q += 3 * weight[i] * d * d.transpose();
     }
-    const Fit fit = capped(middle + axes * mean, axes * q * axes.transpose(), min_radius);
+    const Fit fit = capped(middle + axes * mean, axes * q * axes.transpose(), min_radius, kMaxAxisRatio);
     double reach = fit.reach(input);
     for (const Vec& p : points) reach = std::max(reach, fit.radial(middle + axes * p).norm());
     return fit.scaled(std::max(reach, 1e-3));

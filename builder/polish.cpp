@@ -19,7 +19,8 @@ constexpr double kMargin = 1.2;       // ellipsoids may grow so much before neig
 constexpr int kNeighbourInterval = 4; // sweeps
 constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
 constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
-constexpr double kAncestorCost = 10; // of a volume by which an ancestor grows: all its descendants' queries meet it
+constexpr double kAncestorCost = 10;  // of a volume by which an ancestor grows: all its descendants' queries meet it
+constexpr double kAlmostCapped = 0.9; // of the largest axis ratio of steps
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -345,6 +346,18 @@ private:
     double best_error_ = HUGE_VAL, step_ = kFirstStep, reward_ = 0;
 };
 
+// What is as thin as steps may make it, though its pieces may be thinner: the least ellipsoid around them instead.
+void thin_out(EllipsoidSet& set, const Pieces& pieces, std::span<const uint32_t> owner, double min_radius) {
+    std::vector<std::vector<uint32_t>> owned(set.fits.size());
+    for (uint32_t piece = 0; piece < owner.size(); ++piece) owned[owner[piece]].push_back(piece);
+    parallel_for(size_t{0}, set.fits.size(), [&](size_t i) {
+        Fit& fit = set.fits[i];
+        if (owned[i].empty() || within_caps(fit, 0, kAlmostCapped * kMaxGuidedRatio)) return;
+        const Fit least = fit_pieces(pieces, owned[i], min_radius);
+        if (least.volume() < fit.volume()) fit = least;
+    });
+}
+
 } // namespace
 
 void refine_seams(Pieces& pieces, const EllipsoidSet& set) {
@@ -381,7 +394,9 @@ std::vector<uint32_t> polish(EllipsoidSet& set, const Pieces& pieces, const Dist
                              const PolishOptions& options) {
     Polisher polisher(set, pieces, field, options);
     polisher.run();
-    return polisher.owners();
+    std::vector<uint32_t> owner = polisher.owners();
+    thin_out(set, pieces, owner, options.min_radius);
+    return owner;
 }
 
 } // namespace prolate

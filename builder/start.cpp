@@ -199,7 +199,8 @@ private:
 Cluster cluster_of(const Voxels& voxels, std::vector<uint32_t> cells, double min_radius) {
     Sketch sketch;
     for (const uint32_t cell : cells) sketch.add(voxels.points(cell));
-    return {enclosing_ellipsoid(sketch.points(), min_radius), std::move(cells)};
+    const Fit least = enclosing_ellipsoid(sketch.points(), min_radius);
+    return {capped(least.center, least.factor * least.factor.transpose(), min_radius), std::move(cells)};
 }
 
 } // namespace

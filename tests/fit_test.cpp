@@ -91,10 +91,10 @@ TEST(Capped, KeepsToTheCapsAndWithinCapsSaysSo) {
         const Vec axis = random_vec(random).normalized();
         const double unit = std::pow(10.0, 12 * random.uniform() - 6), flat = std::pow(10.0, -14 * random.uniform());
         const Mat q = unit * unit * (Mat::Identity() - (1 - flat) * axis * axis.transpose());
-        const Fit raw(Vec::Zero(), cholesky(q)), fit = capped(Vec::Zero(), q, 1e-6 * unit);
-        EXPECT_TRUE(within_caps(fit, 1e-6 * unit));
+        const Fit raw(Vec::Zero(), cholesky(q)), fit = capped(Vec::Zero(), q, 1e-6 * unit, kMaxAxisRatio);
+        EXPECT_TRUE(within_caps(fit, 1e-6 * unit, kMaxAxisRatio));
         const bool legal = flat * kMaxAxisRatio * kMaxAxisRatio >= 1;
-        EXPECT_EQ(within_caps(raw, 1e-6 * unit), legal);
+        EXPECT_EQ(within_caps(raw, 1e-6 * unit, kMaxAxisRatio), legal);
         if (legal) {
             EXPECT_EQ(fit.factor, raw.factor);
         }
