@@ -40,6 +40,7 @@ constexpr double kTolerance = 1e-7;    // of the smaller ellipsoid: how exact de
 constexpr double kSamePoint = 1e-4;    // of the smaller body: what is nearer is one point
 constexpr double kSameFace = 0.9;      // cosine: a face turned farther from a normal has no points along it
 constexpr double kSameAsFace = 0.9999; // cosine: a normal that is the face's
+constexpr double kSlack = 0.25;        // of a depth: the normals of curved bodies are means, and no exact ones
 constexpr double kFirstTilt = 0.1, kLeastTilt = 1e-3; // radians, about: steps of the search for the shortest way
 constexpr int kTiltRounds = 8;
 constexpr double kSameNormal = 0.8; // cosine: normals of a point in two queries, if it is the same
@@ -129,7 +130,8 @@ public:
             for (uint32_t j = 0; j < count && needed[i]; ++j)
                 if (j != i && needed[j])
                     needed[i] = !std::all_of(groups[i].patch->begin(), groups[i].patch->end(), [&](const Candidate& c) {
-                        return resolves(groups[j].way.normal, groups[j].way.depth, c.pair);
+                        return resolves(groups[j].way.normal,
+                                        groups[j].way.depth + kSlack * std::abs(groups[j].way.depth), c.pair);
                     });
         for (uint32_t i = 0; i < count && ways_ < kManifolds; ++i)
             if (needed[i]) way_[ways_] = groups[i].way, points_[ways_] = groups[i].deepest, ++ways_;
@@ -367,16 +369,20 @@ private:
     // climbed along its normal to what is deepest around there, and a ray from it finds the other body's surface.
     void add_deepest(const Patch& from, const dvec3& n, Patch& to) {
         for (const bool of_a : {true, false}) {
-            uint32_t seen[Patch::kSieve], count = 0; // vertices
-            for (const Candidate& c : from) {
-                if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
-                const Surrounded around = of_a ? surrounded_a(c.pair.triangle_a) : surrounded_b(c.pair.triangle_b);
-                const dvec3 up = of_a ? n : -n; // out of the body
+            uint32_t seen[2 * Patch::kSieve], count = 0; // vertices
+            const auto look = [&](const MeetingPair& pair, const dvec3& along) {
+                const Surrounded around = of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b);
+                const dvec3 up = of_a ? along : -along; // out of the body
                 Climb climb = around.climb(around.highest(up), up);
                 while (climb.steps_left > 0) climb.step();
-                if (std::find(seen, seen + count, climb.vertex) != seen + count) continue;
+                if (std::find(seen, seen + count, climb.vertex) != seen + count) return;
                 seen[count++] = climb.vertex;
-                add_deepest(c.pair, climb.vertex, n, from.overlap(), of_a, to);
+                add_deepest(pair, climb.vertex, n, from.overlap(), of_a, to);
+            };
+            for (const Candidate& c : from) {
+                if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
+                look(c.pair, n);
+                if (!(glm::dot(c.normal, n) > kSameAsFace)) look(c.pair, c.normal); // in a hollow of faces
             }
         }
     }
@@ -428,7 +434,7 @@ private:
     }
 
     Candidate candidate(const Contact& c) const {
-        Candidate out{c.middle, c.depth, swapped_ ? id_of(c.b, c.a) : id_of(c.a, c.b), false, c.pair};
+        Candidate out{c.middle, c.depth, swapped_ ? id_of(c.b, c.a) : id_of(c.a, c.b), false, c.normal, c.pair};
         for (uint32_t i = 0; i < std::min(last_.count, kManifolds); ++i) {
             const Manifold& m = last_.manifolds[i];
             const bool alike = glm::dot(last_normals_[i], c.normal) > kSameNormal;
@@ -519,6 +525,7 @@ ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactMan
     out.found = descent.found;
     descent.stats.deepest_level = std::max(descent.a.deepest_level(), descent.b.deepest_level());
     out.stats = descent.stats;
+    out.stats.triangle_tests += descent.other_tests;
     if (!std::isfinite(descent.b_to_a.distance)) return out; // no place for points
 
     if (descent.found > 0) {

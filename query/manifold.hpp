@@ -21,7 +21,8 @@ struct Candidate {
     glm::dvec3 middle{0, 0, 0}; // between the surfaces
     double depth = 0;
     uint64_t id = 0;
-    bool known = false; // of the last query
+    bool known = false;         // of the last query
+    glm::dvec3 normal{0, 0, 1}; // of the pair
     MeetingPair pair;
 };
 

@@ -14,13 +14,13 @@ namespace {
 using glm::dvec3;
 using Corners = dvec3[3];
 
-constexpr double kEdgeBias = 0.05;        // an edge's product must overlap by this share less than a face does
-constexpr double kParallel = 1e-8;        // sine of an angle: edges that are nearer to parallel have no product
-constexpr double kFlat = 1e-9;            // of the triangles' size: what counts as touching
-constexpr double kCrossing = 1e-6;        // of the triangles' size: what edges may miss each other by
-constexpr double kFacing = 0.9;           // cosine: a face turned farther from a normal is not cut along it
-constexpr double kNoLonger = 0.25;        // share by which ways out may be longer than a known one
-constexpr double kSameDirection = 0.9999; // cosine: normals that are the same but for rounding
+constexpr double kEdgeBias = 0.05;           // an edge's product must overlap by this share less than a face does
+constexpr double kParallel = 1e-8;           // sine of an angle: edges that are nearer to parallel have no product
+constexpr double kFlat = 1e-9;               // of the triangles' size: what counts as touching
+constexpr double kCrossing = 1e-6;           // of the triangles' size: what edges may miss each other by
+constexpr double kFacing = 0.9;              // cosine: a face turned farther from a normal is not cut along it
+constexpr double kNoLonger = 0.25;           // share by which ways out may be longer than a known one
+constexpr double kSameDirection = 1 - 1e-10; // cosine: normals that are the same but for rounding
 constexpr double kAskance = 0.3; // cosine: a face that looks this much the same way as the normal is not in contact
 
 struct Axis {

@@ -48,7 +48,7 @@ struct ContactResult {
     /// overlapping, though no surfaces meet: a part of one body lies inside the other. There are no points then.
     bool enclosed = false;
     uint64_t found = 0; ///< pairs of leaves, or of triangles, that meet
-    QueryStats stats;
+    QueryStats stats;   ///< looking around triangles counts as tests of triangles
 };
 
 /// Contacts of `a` at `pose_a` and `b` at `pose_b`, and what comes as near as options.margin. Replaces what `manifolds`
