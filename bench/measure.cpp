@@ -117,10 +117,10 @@ Baked bake(const std::string& path, const BuildOptions& options, int columns_acr
 } // namespace
 
 std::optional<Model> load_model(const std::string& path) {
-    std::string detail;
-    const auto mesh = load_mesh(path.c_str(), &detail);
+    ImportReport report;
+    const auto mesh = load_mesh(path.c_str(), {}, &report);
     if (!mesh) {
-        fmt::print(stderr, "{}: {} {}\n", path, mesh.error().what, detail);
+        fmt::print(stderr, "{}: {} {}\n", path, mesh.error().what, report.detail);
         return std::nullopt;
     }
     auto cleaned = clean(mesh->view());

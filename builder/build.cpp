@@ -7,11 +7,11 @@
 #include "builder/grow.hpp"
 #include "builder/hausdorff.hpp"
 #include "builder/hulls.hpp"
+#include "builder/job.hpp"
 
 #include "src/format.hpp"
 
 #include <Eigen/Geometry>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -37,7 +37,6 @@ constexpr double kCellsPerLeaf = 24;      // of the coarser grid that the optimi
 constexpr uint32_t kLeastCells = 48;      // of that grid, along the longest side
 constexpr int kMeterColumns = 192;        // to compare covers while baking
 constexpr int kMeasureColumns = 512;      // of the reported figures
-constexpr double kSmallestRadius = 1e-5;  // of the diagonal
 // How exactly distances are measured, by quality.
 constexpr double kDistanceTolerance[] = {1e-3, 1e-4, 1e-4};  // of the largest one, in diagonals
 constexpr uint32_t kDistanceSamples[] = {2000, 8000, 32000}; // for mean and percentile
@@ -51,21 +50,28 @@ constexpr double kMostOverlap = 1e-3;
 class Bake {
 public:
     Bake(const BuildOptions& options, const ProgressCallback& progress)
-        : options_(options), effort_(effort_of(options.quality)), progress_(progress) {}
+        : options_(options), effort_(effort_of(options.quality)), progress_(progress),
+          job_(options.threads, progress ? [this] { return go_on(); } : std::function<bool()>()) {}
 
+    Result<Build> operator()(MeshView mesh) {
+        return job_.run([&] { return run(mesh); });
+    }
+
+private:
     Result<Build> run(MeshView input) {
         const auto start = Clock::now();
-        auto cleaned = clean(input);
+        auto cleaned = clean(input, options_.weld);
         if (!cleaned) return cleaned.error();
         mesh_ = cleaned->mesh.view();
         closed_ = cleaned->report.closed;
+        margin_ = cleaned->report.weld_distance;
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
         if (options_.exact) return run_exact(cleaned->report, start);
-        if (!report("voxelise", 0, 0)) return stopped();
+        report("voxelise", 0, 0);
 
         const Winding winding(mesh_);
         Pieces pieces = cut_pieces(winding);
-        if (!report("voxelise", 0.04, 0)) return stopped();
+        report("voxelise", 0.04, 0);
         const Columns columns = measure_solid(winding);
         if (options_.tolerance > 0 && solid_.value == 0)
             return Error{ErrorCode::bad_mesh,
@@ -80,10 +86,9 @@ public:
                              "the analytic method needs a closed mesh whose parts do not overlap; use the voxel method",
                              0};
         }
-        if (!report("fit", 0.05, 1)) return stopped();
+        report("fit", 0.05, 1);
 
         const Grown grown = grow_tree(pieces, winding);
-        if (cancelled_) return stopped();
 
         std::vector<format::PackedLevel> levels;
         if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
@@ -94,7 +99,6 @@ public:
             auto draft = Tree::open(format::encode(info, options_.degree, lattice_, levels));
             if (!draft) return draft.error();
             figures = measure(draft->view(), grown, columns, winding, levels);
-            if (cancelled_) return stopped();
         }
         auto tree = Tree::open(format::encode(info, options_.degree, lattice_, levels));
         if (!tree) return tree.error();
@@ -104,18 +108,17 @@ public:
                      box_.size().norm(), resolution_,     !closed_,           grown.goal_reached, seconds_since(start)};
     }
 
-private:
     Result<Build> run_exact(const MeshReport& mesh_report, Clock::time_point start) {
-        if (!report("measure", 0, 0)) return stopped();
-        measure_solid(Winding(mesh_));
-        if (!report("split", 0.1, 1)) return stopped();
-        ExactOptions options{options_.degree, options_.leaf_triangles, kSmallestRadius * box_.size().norm(), {}};
-        if (progress_) options.progress = [this](double done) { return report("split", 0.1 + 0.75 * done, 0); };
+        report("measure", 0, 0);
+        if (closed_) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
+        report("split", 0.1, 1);
+        ExactOptions options{options_.degree, options_.leaf_triangles, min_radius(), margin_, {}};
+        options.progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); };
         const auto grown = grow_exact(mesh_, options);
         if (!grown) return grown.error();
         std::vector<std::byte> bytes =
             format::encode(describe(true), options_.degree, grown->lattice, grown->levels, grown->packed());
-        if (!report("hulls", 0.85, 0)) return stopped();
+        report("hulls", 0.85, 0);
         const auto without_hulls = TreeView::open(bytes, {.check_hash = false}); // Tree::open() checks the whole
         if (!without_hulls) return without_hulls.error();
         format::store_hulls(bytes, hulls_of(*without_hulls));
@@ -140,14 +143,22 @@ private:
         return columns;
     }
 
-    bool report(const char* stage, double fraction, uint32_t nodes) {
-        if (!progress_) return true;
-        const std::lock_guard lock(reporting_);
-        fraction_ = std::max(fraction_, fraction);
-        if (!progress_({stage, fraction_, nodes})) cancelled_ = true;
-        return !cancelled_;
+    // Tells the caller, and asks whether to go on; throws Cancelled if not.
+    void report(const char* stage, double fraction, uint32_t nodes) {
+        {
+            const std::lock_guard lock(reporting_);
+            reached_ = {stage, std::max(reached_.fraction, fraction), nodes};
+        }
+        job_.ask();
     }
-    static Error stopped() { return {ErrorCode::cancelled, "cancelled", 0}; }
+    bool go_on() {
+        BuildProgress reached;
+        {
+            const std::lock_guard lock(reporting_);
+            reached = reached_;
+        }
+        return progress_(reached);
+    }
 
     double surface_area() const {
         double area = 0;
@@ -159,6 +170,10 @@ private:
     }
     double distance_tolerance() const {
         return kDistanceTolerance[static_cast<size_t>(options_.quality)] * box_.size().norm();
+    }
+    double min_radius() const {
+        const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
+        return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
     }
     // A volume as a share of the solid's.
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
@@ -174,10 +189,9 @@ private:
     Pieces cut_pieces(const Winding& winding) {
         resolution_ = effort_.resolution;
         for (;;) {
-            const bool go_on = report("voxelise", 0.01, 0);
+            report("voxelise", 0.01, 0);
             Pieces pieces(mesh_, closed_, winding, resolution_);
-            if (pieces.size() >= kPiecesPerLeaf * expected_leaves() || resolution_ == kMaxResolution || !go_on)
-                return pieces;
+            if (pieces.size() >= kPiecesPerLeaf * expected_leaves() || resolution_ == kMaxResolution) return pieces;
             resolution_ = finer(resolution_, kPiecesPerLeaf * expected_leaves() / pieces.size());
         }
     }
@@ -200,12 +214,10 @@ private:
         const DistanceField field(mesh_, closed_, winding, std::min(field_resolution, kMaxFieldResolution));
         const Voxels cells = start_cells(winding);
         const Columns columns = measuring_columns(mesh_, closed_, winding, kMeterColumns);
-        const GrowOptions options{options_,
-                                  effort_,
-                                  kSmallestRadius * box_.size().norm(),
-                                  box_.size().norm(),
-                                  &cancelled_,
-                                  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
+        const GrowOptions options{
+            options_,     effort_,
+            min_radius(), box_.size().norm(),
+            &cancelled_,  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
         const auto exact = [&winding, sign = winding_sign_](const Fit& fit) {
             EllipsoidVolume inside = inside_volume(fit, winding);
             inside.volume *= sign, inside.d_center *= sign, inside.d_shape *= sign;
@@ -236,7 +248,7 @@ private:
             format::PackedLevel& level = levels.emplace_back();
             for (const uint32_t index : current) {
                 const GrownNode& node = grown.nodes[index];
-                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_);
+                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_, margin_);
                 if (!packed)
                     return Error{ErrorCode::bad_mesh,
                                  "the mesh is too large or too small for the file format; "
@@ -275,6 +287,8 @@ private:
         info.levels = asked ? options_.levels : 3;
         info.ellipsoids = options_.ellipsoids;
         info.seed = options_.seed;
+        info.placement = mesh_.placement;
+        info.weld = options_.weld;
         info.resolution = resolution_;
         return info;
     }
@@ -283,7 +297,7 @@ private:
                                      const Winding& winding, std::vector<format::PackedLevel>& levels) {
         std::vector<LevelReport> figures;
         for (uint32_t l = 0; l < tree.level_count(); ++l) {
-            if (!report("measure", 0.8 + 0.05 * l / tree.level_count(), tree.node_count())) return {};
+            report("measure", 0.8 + 0.05 * l / tree.level_count(), tree.node_count());
             const auto start = Clock::now();
             std::vector<Ellipsoid> cut;
             tree.for_each_in_cut(l, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
@@ -318,7 +332,10 @@ private:
         VerifyOptions options;
         options.threads = options_.threads;
         if (progress_)
-            options.progress = [&](double done) { return report("prove", 0.85 + 0.15 * done, tree.node_count()); };
+            options.progress = [&](double done) {
+                report("prove", 0.85 + 0.15 * done, tree.node_count());
+                return true;
+            };
         const auto start = Clock::now();
         const auto proof = verify(tree, mesh_, options);
         if (!proof) return proof.error();
@@ -341,12 +358,14 @@ private:
     const BuildOptions& options_;
     const Effort effort_;
     const ProgressCallback& progress_;
+    Job job_;
     std::mutex reporting_;
-    std::atomic<bool> cancelled_ = false;
-    double fraction_ = 0;
+    BuildProgress reached_{"clean", 0, 0};
+    std::atomic<bool> cancelled_ = false; // stays so: Cancelled ends all work
 
     MeshView mesh_;
     bool closed_ = false;
+    double margin_ = 0; // by which welding moved points: they are covered as they stood
     Box box_;
     uint32_t resolution_ = 0;
     Quadrature solid_;        // its volume; 0 where there is no inside
@@ -360,10 +379,11 @@ private:
 Result<Build> build(MeshView mesh, const BuildOptions& options, const ProgressCallback& progress) {
     if (const auto valid = validate(options); !valid) return valid.error();
     try {
-        tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
-        return arena.execute([&] { return Bake(options, progress).run(mesh); });
+        return Bake(options, progress)(mesh);
+    } catch (const Cancelled&) {
+        return Error{ErrorCode::cancelled, "cancelled", 0};
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::bad_mesh, "not enough memory; lower the quality, the count or the mesh's size", 0};
+        return Error{ErrorCode::out_of_memory, "there is not enough memory"};
     }
 }
 

@@ -1,8 +1,6 @@
 #include "builder/columns.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
+#include "builder/job.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,9 @@ namespace {
 
 // The frame of measuring lattices: its x-axis runs along (golden ratio, 1), a slope far from every simple fraction.
 constexpr ColumnLattice kTurned{0, 0, 1, 1, 0, 0, 0.85065080835203993, 0.52573111211913361};
+
+// Columns that meet ellipsoids to be measured, at most: times the solid's, and so many more for each ellipsoid.
+constexpr double kMostColumns = 16, kMostColumnsEach = 1 << 12;
 
 struct Crossing {
     double z;
@@ -37,8 +38,10 @@ std::pair<int, int> index_range(double low, double high, double x0, double pitch
 }
 
 template <class Visit> void for_each_crossing(MeshView mesh, const ColumnLattice& lattice, Visit&& visit) {
+    Checkpoints checkpoints;
     const auto corner = [&](uint32_t v) { return lattice.to_frame(to_vec(mesh.vertices[v])); };
     for (const Triangle& t : mesh.triangles) {
+        checkpoints();
         const Vec a = corner(t[0]), b = corner(t[1]), c = corner(t[2]);
         const auto [i0, i1] = index_range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), lattice.x0,
                                           lattice.dx, lattice.nx);
@@ -120,7 +123,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
     std::vector<std::vector<Interval>> rows(static_cast<size_t>(lattice.nx));
     std::vector<size_t> interval_count(count + 1, 0);
     std::vector<WindingDefect> defects(static_cast<size_t>(lattice.nx));
-    tbb::parallel_for(0, lattice.nx, [&](int i) {
+    parallel_for(0, lattice.nx, [&](int i) {
         std::vector<Interval>& row = rows[static_cast<size_t>(i)];
         for (int j = 0; j < lattice.ny; ++j) {
             const size_t c = static_cast<size_t>(i) * static_cast<size_t>(lattice.ny) + static_cast<size_t>(j);
@@ -177,49 +180,71 @@ Columns measuring_columns(MeshView mesh, bool closed, const Winding& winding, in
     return {mesh, closed, winding, measuring_lattice(box, columns_across)};
 }
 
-CoverVolume measure_cover(const Columns& solid, std::span<const Ellipsoid> ellipsoids) {
-    const ColumnLattice& lattice = solid.lattice();
-    // Each ellipsoid in the lattice's frame, as L^-1, with the rows and columns that it meets: first ... last.
-    struct Shape {
-        Vec c;
-        Mat inverse;
-        int i0, i1, j0, j1;
-    };
-    std::vector<Shape> shapes;
+namespace {
+
+// An ellipsoid in the lattice's frame, as L^-1, with the rows and columns that it meets: first ... last.
+struct Shape {
+    Vec c;
+    Mat inverse;
+    double i0, i1, j0, j1;
+
+    double columns() const { return std::max(0.0, i1 - i0 + 1) * std::max(0.0, j1 - j0 + 1); }
+};
+
+Shape shape_on(const ColumnLattice& lattice, const Ellipsoid& e) {
+    Mat l;
+    l << e.l11, 0, 0, e.l21, e.l22, 0, e.l31, e.l32, e.l33;
+    const Mat inverse = l.triangularView<Eigen::Lower>().solve(Mat::Identity());
+    Mat turned, turned_inverse; // the columns of L, the rows of L^-1
+    for (int k = 0; k < 3; ++k) {
+        turned.col(k) = lattice.to_frame(l.col(k));
+        turned_inverse.row(k) = lattice.to_frame(inverse.row(k)).transpose();
+    }
+    const Vec half = turned.rowwise().norm(), c = lattice.to_frame(to_vec(e.center));
+    const auto index = [](double x, double origin, double step) { return std::floor((x - origin) / step); };
+    return {c,
+            turned_inverse,
+            index(c.x() - half.x(), lattice.x0, lattice.dx) + 1,
+            index(c.x() + half.x(), lattice.x0, lattice.dx),
+            index(c.y() - half.y(), lattice.y0, lattice.dy) + 1,
+            index(c.y() + half.y(), lattice.y0, lattice.dy)};
+}
+
+std::vector<Shape> shapes_on(const ColumnLattice& lattice, std::span<const Ellipsoid> ellipsoids) {
+    std::vector<Shape> out;
+    out.reserve(ellipsoids.size());
+    for (const Ellipsoid& e : ellipsoids) out.push_back(shape_on(lattice, e));
+    return out;
+}
+
+// What columns see of some ellipsoids.
+struct Seen {
+    Quadrature solid, whole, outside, sum, sum_outside;
+};
+
+// All columns that meet the shapes; `solid`, of the same lattice, may be null: there is none.
+Seen look(const ColumnLattice& lattice, const Columns* solid, std::span<const Shape> shapes) {
     int row_low = 0, row_high = lattice.nx - 1;
-    for (const Ellipsoid& e : ellipsoids) {
-        Mat l;
-        l << e.l11, 0, 0, e.l21, e.l22, 0, e.l31, e.l32, e.l33;
-        const Mat inverse = l.triangularView<Eigen::Lower>().solve(Mat::Identity());
-        Mat turned, turned_inverse; // the columns of L, the rows of L^-1
-        for (int k = 0; k < 3; ++k) {
-            turned.col(k) = lattice.to_frame(l.col(k));
-            turned_inverse.row(k) = lattice.to_frame(inverse.row(k)).transpose();
-        }
-        const Vec half = turned.rowwise().norm(), c = lattice.to_frame(to_vec(e.center));
-        const auto index = [](double x, double origin, double step) {
-            return static_cast<int>(std::clamp(std::floor((x - origin) / step), -1e6, 1e6));
-        };
-        shapes.push_back({c, turned_inverse, index(c.x() - half.x(), lattice.x0, lattice.dx) + 1,
-                          index(c.x() + half.x(), lattice.x0, lattice.dx),
-                          index(c.y() - half.y(), lattice.y0, lattice.dy) + 1,
-                          index(c.y() + half.y(), lattice.y0, lattice.dy)});
-        row_low = std::min(row_low, shapes.back().i0), row_high = std::max(row_high, shapes.back().i1);
+    for (const Shape& s : shapes) {
+        if (s.columns() == 0) continue;
+        row_low = std::min(row_low, static_cast<int>(s.i0)), row_high = std::max(row_high, static_cast<int>(s.i1));
     }
     std::vector<std::vector<uint32_t>> by_row(static_cast<size_t>(row_high - row_low + 1));
     for (uint32_t s = 0; s < shapes.size(); ++s)
-        for (int i = shapes[s].i0; i <= shapes[s].i1; ++i) by_row[static_cast<size_t>(i - row_low)].push_back(s);
+        if (shapes[s].columns() > 0)
+            for (auto i = static_cast<int>(shapes[s].i0); i <= static_cast<int>(shapes[s].i1); ++i)
+                by_row[static_cast<size_t>(i - row_low)].push_back(s);
 
     struct Row {
-        Sum solid, whole, outside, sum_outside;
+        Sum solid, whole, outside, sum, sum_outside;
     };
     std::vector<Row> rows(by_row.size());
-    tbb::parallel_for(size_t{0}, rows.size(), [&](size_t r) {
-        Row& sum = rows[r];
+    parallel_for(size_t{0}, rows.size(), [&](size_t r) {
+        Row& total = rows[r];
         const int i = static_cast<int>(r) + row_low;
         const auto solid_in = [&](int j) {
-            const bool on_lattice = i >= 0 && i < lattice.nx && j >= 0 && j < lattice.ny;
-            return on_lattice ? solid.column(i, j) : std::span<const Interval>();
+            const bool known = solid != nullptr && i >= 0 && i < lattice.nx && j >= 0 && j < lattice.ny;
+            return known ? solid->column(i, j) : std::span<const Interval>();
         };
         // What of an interval is outside the solid.
         const auto outside = [&](int j, const Interval& s) {
@@ -235,40 +260,76 @@ CoverVolume measure_cover(const Columns& solid, std::span<const Ellipsoid> ellip
         std::vector<Piece> cover;
         const double x = lattice.x0 + i * lattice.dx;
         for (const uint32_t s : by_row[r]) {
+            checkpoint();
             const Shape& shape = shapes[s];
             // |w + z u|^2 = 1 with u = the z-column of L^-1, w = the rest.
             const Vec u = shape.inverse.col(2), wx = shape.inverse.col(0) * (x - shape.c.x());
             const double uu = u.squaredNorm();
-            for (int j = shape.j0; j <= shape.j1; ++j) {
+            for (auto j = static_cast<int>(shape.j0); j <= static_cast<int>(shape.j1); ++j) {
                 const Vec w = wx + shape.inverse.col(1) * (lattice.y0 + j * lattice.dy - shape.c.y());
                 const double uw = u.dot(w), discriminant = uw * uw - uu * (w.squaredNorm() - 1);
                 if (discriminant <= 0) continue;
                 const double middle = shape.c.z() - uw / uu, half = std::sqrt(discriminant) / uu;
                 cover.push_back({j, {middle - half, middle + half}});
-                sum.sum_outside.add(i, j, outside(j, cover.back().z));
+                total.sum.add(i, j, 2 * half);
+                total.sum_outside.add(i, j, outside(j, cover.back().z));
             }
         }
         for (int j = 0; j < lattice.ny; ++j)
-            for (const Interval& s : solid_in(j)) sum.solid.add(i, j, s.high - s.low);
+            for (const Interval& s : solid_in(j)) total.solid.add(i, j, s.high - s.low);
         std::sort(cover.begin(), cover.end(),
                   [](const Piece& a, const Piece& b) { return a.j != b.j ? a.j < b.j : a.z.low < b.z.low; });
         for (size_t k = 0; k < cover.size();) { // maximal intervals of the union
             auto [j, piece] = cover[k];
             for (++k; k < cover.size() && cover[k].j == j && cover[k].z.low <= piece.high; ++k)
                 piece.high = std::max(piece.high, cover[k].z.high);
-            sum.whole.add(i, j, piece.high - piece.low);
-            sum.outside.add(i, j, outside(j, piece));
+            total.whole.add(i, j, piece.high - piece.low);
+            total.outside.add(i, j, outside(j, piece));
         }
     });
-    Row total;
+    Row all;
     for (const Row& row : rows) { // in order: the same sum for any number of threads
-        total.solid.add(row.solid);
-        total.whole.add(row.whole);
-        total.outside.add(row.outside);
-        total.sum_outside.add(row.sum_outside);
+        all.solid.add(row.solid);
+        all.whole.add(row.whole);
+        all.outside.add(row.outside);
+        all.sum.add(row.sum);
+        all.sum_outside.add(row.sum_outside);
     }
     const double area = lattice.dx * lattice.dy;
-    return {total.solid.times(area), total.whole.times(area), total.outside.times(area), total.sum_outside.times(area)};
+    return {all.solid.times(area), all.whole.times(area), all.outside.times(area), all.sum.times(area),
+            all.sum_outside.times(area)};
+}
+
+// `whole` less what of it is in the solid, `part` less `part_outside`.
+Quadrature remainder(const Quadrature& whole, const Quadrature& part, const Quadrature& part_outside) {
+    return {whole.value - (part.value - part_outside.value), whole.error + part.error + part_outside.error};
+}
+
+} // namespace
+
+CoverVolume measure_cover(const Columns& solid, std::span<const Ellipsoid> ellipsoids) {
+    ColumnLattice lattice = solid.lattice();
+    std::vector<Shape> shapes = shapes_on(lattice, ellipsoids);
+    double columns = 0;
+    for (const Shape& s : shapes) columns += s.columns();
+    const double most = kMostColumns * lattice.nx * lattice.ny + kMostColumnsEach * static_cast<double>(shapes.size());
+    if (columns <= most) {
+        const Seen seen = look(lattice, &solid, shapes);
+        return {seen.solid, seen.whole, seen.outside, seen.sum_outside};
+    }
+    // They stick out of a thin solid so far that its lattice is too fine for them: then only what may be in the solid
+    // is measured by it, and all of them by a coarser one.
+    for (Shape& s : shapes) {
+        s.i0 = std::max(s.i0, 0.0), s.i1 = std::min(s.i1, lattice.nx - 1.0);
+        s.j0 = std::max(s.j0, 0.0), s.j1 = std::min(s.j1, lattice.ny - 1.0);
+    }
+    const Seen near = look(lattice, &solid, shapes);
+    const double coarser = std::sqrt(columns / most);
+    lattice.dx *= coarser, lattice.dy *= coarser;
+    lattice.nx = lattice.ny = 0;
+    const Seen far = look(lattice, nullptr, shapes_on(lattice, ellipsoids));
+    return {near.solid, far.whole, remainder(far.whole, near.whole, near.outside),
+            remainder(far.sum, near.sum, near.sum_outside)};
 }
 
 } // namespace prolate

@@ -84,7 +84,8 @@ struct CoverVolume {
     Quadrature sum_outside; ///< sum over the ellipsoids, each less the solid
 };
 
-/// Measures the union of `ellipsoids` against the solid, on its columns; beyond them the same lattice goes on.
+/// Measures the union of `ellipsoids` against the solid, on its columns; beyond them the same lattice goes on, or a
+/// coarser one if the ellipsoids are very much larger than the solid: the work is bounded.
 CoverVolume measure_cover(const Columns& solid, std::span<const Ellipsoid> ellipsoids);
 
 } // namespace prolate

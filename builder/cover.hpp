@@ -22,9 +22,12 @@ inline constexpr double kSlack = 0x1p-14;
 std::optional<format::PackedNode> covering_node(const Fit& fit, const format::Lattice& lattice,
                                                 const std::function<double(const Fit&)>& reach);
 
-/// The same for the points of `members`.
+/// The same for the points of `members`, and all points within `margin` of them.
 std::optional<format::PackedNode> covering_node(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members,
-                                                const format::Lattice& lattice);
+                                                const format::Lattice& lattice, double margin = 0);
+
+/// How much farther out in radial coordinates points may lie within `margin` of others: |L^-1 v| <= |L^-1| |v|.
+double radial_margin(const Fit& fit, double margin);
 
 /// E_sur: largest radial distance |p - d_o(p)| between a point of the mesh in `members` and its radial projection onto
 /// the ellipsoid (paper, eq. 1), over the corners of the clipped triangles.

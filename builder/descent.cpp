@@ -1,7 +1,9 @@
 #include "builder/descent.hpp"
 
 #include "builder/central.hpp"
+#include "builder/job.hpp"
 #include "builder/random.hpp"
+
 #include "src/symmetric3.hpp"
 
 #include <Eigen/Geometry>
@@ -54,6 +56,7 @@ public:
         std::vector<Fit> next(fits_.size());
         for (int iteration = 0; iteration < options_.iterations; ++iteration) {
             if (options_.cancelled->load(std::memory_order_relaxed)) return;
+            checkpoint();
             const double t = static_cast<double>(iteration) / std::max(1, options_.iterations - 1);
             bool look = iteration % kNeighbourInterval == 0;
             if (options_.relocate && t < kRelocateUntil && iteration > 0 &&
@@ -67,9 +70,7 @@ public:
             const Mat rotation = random_rotation(random_);
             for (size_t d = 0; d < directions_.size(); ++d) rotated_[d] = rotation * directions_[d];
             update_points(static_cast<size_t>(iteration), t > kAccumulateFrom);
-            tbb::parallel_for(tbb::blocked_range<size_t>(0, fits_.size(), 8), [&](const auto& range) {
-                for (size_t i = range.begin(); i != range.end(); ++i) next[i] = step(i);
-            });
+            parallel_for(size_t{0}, fits_.size(), [&](size_t i) { next[i] = step(i); });
             fits_.swap(next);
             decay_mean_ *= kMean, decay_square_ *= kSquare;
             if (options_.progress && iteration % 16 == 0) options_.progress(t);

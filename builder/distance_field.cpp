@@ -1,10 +1,9 @@
 #include "builder/distance_field.hpp"
 
+#include "builder/job.hpp"
 #include "builder/triangle_tree.hpp"
 
 #include <Eigen/Geometry>
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,9 +31,11 @@ DistanceField::DistanceField(MeshView mesh, bool closed, const Winding& winding,
 // Exact distances around each triangle, one step beyond its box: slabs of the lattice in parallel.
 void DistanceField::seed(MeshView mesh) {
     constexpr int kSlab = 8;
-    tbb::parallel_for(0, (size_[0] + kSlab - 1) / kSlab, [&](int slab) {
+    parallel_for(0, (size_[0] + kSlab - 1) / kSlab, [&](int slab) {
         const int first = slab * kSlab, last = std::min(first + kSlab, size_[0]) - 1;
+        Checkpoints checkpoints;
         for (const Triangle& t : mesh.triangles) {
+            checkpoints();
             const Vec a = to_vec(mesh.vertices[t[0]]), b = to_vec(mesh.vertices[t[1]]), c = to_vec(mesh.vertices[t[2]]);
             const Vec low = (a.cwiseMin(b).cwiseMin(c) - origin_) * per_pitch_;
             const Vec high = (a.cwiseMax(b).cwiseMax(c) - origin_) * per_pitch_;
@@ -66,7 +67,7 @@ void DistanceField::propagate() {
     for (int pass = 0; pass < 2; ++pass)
         for (size_t axis = 3; axis-- > 0;) {
             const size_t u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-            tbb::parallel_for(0, size_[u], [&](int a) {
+            parallel_for(0, size_[u], [&](int a) {
                 for (int b = 0; b < size_[v]; ++b) {
                     int at[3];
                     at[u] = a, at[v] = b;

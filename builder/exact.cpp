@@ -28,17 +28,14 @@
 
 #include "builder/cover.hpp"
 #include "builder/fit.hpp"
+#include "builder/job.hpp"
 
 #include "src/symmetric3.hpp"
-
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <numbers>
 #include <numeric>
 #include <span>
@@ -137,7 +134,7 @@ public:
         extents_.resize(count_);
         order_.resize(count_);
         std::iota(order_.begin(), order_.end(), 0u);
-        tbb::parallel_for(0u, count_, [&](uint32_t t) {
+        parallel_for(0u, count_, [&](uint32_t t) {
             for (const uint32_t v : mesh_.triangles[t]) extents_[t].add(mesh_.vertices[v]);
         });
     }
@@ -147,11 +144,8 @@ public:
         split(0, {0, count_}, kMaxLevels - 1);
         Node root;
         Sketch sketch;
-        if (!cancelled_) {
-            choose();
-            grow(root, sketch);
-        }
-        if (cancelled_) return Error{ErrorCode::cancelled, "cancelled", 0};
+        choose();
+        grow(root, sketch);
         if (too_large_)
             return Error{ErrorCode::bad_mesh,
                          "the mesh is too large or too small for the file format; scale it to metres", 0};
@@ -244,7 +238,7 @@ private:
             cuts[a] = p.size() > kSortedBelow ? cut_binned(p, axes[a]) : cut_sorted(p, axes[a]);
         };
         if (p.size() > kSortedBelow)
-            tbb::parallel_for(size_t{0}, cuts.size(), try_axis);
+            parallel_for(size_t{0}, cuts.size(), try_axis);
         else
             for (size_t a = 0; a < cuts.size(); ++a) try_axis(a);
         const auto cheaper = [](const Cut& x, const Cut& y) { return x.cost < y.cost; };
@@ -268,7 +262,7 @@ private:
     Extents split(uint32_t index, const Part& p, uint32_t levels) {
         Halves& node = binary_[index];
         node.part = p;
-        if (cancelled_) return {};
+        checkpoint();
         Extents all;
         if (p.size() == 1) {
             all = extents_[order_[p.begin]];
@@ -280,7 +274,7 @@ private:
             const auto make_left = [&] { all = split(left_of(index), {p.begin, middle}, levels - 1); };
             const auto make_right = [&] { right = split(right_of(index), {middle, p.end}, levels - 1); };
             if (p.size() > kParallelAbove)
-                tbb::parallel_invoke(make_left, make_right);
+                parallel_invoke(make_left, make_right);
             else
                 make_left(), make_right();
             all.add(right);
@@ -354,7 +348,7 @@ private:
 
     // Makes all below `node`, and `sketch` that of its corners.
     void grow(Node& node, Sketch& sketch) {
-        if (cancelled_) return;
+        checkpoint();
         const Halves& halves = binary_[node.binary];
         const uint32_t size = halves.part.size();
         if (halves.lanes == 0) {
@@ -370,10 +364,9 @@ private:
             std::vector<Sketch> sketches(node.children.size());
             const auto grow_child = [&](size_t c) { grow(node.children[c], sketches[c]); };
             if (size > kParallelAbove)
-                tbb::parallel_for(size_t{0}, sketches.size(), grow_child);
+                parallel_for(size_t{0}, sketches.size(), grow_child);
             else
                 for (size_t c = 0; c < sketches.size(); ++c) grow_child(c);
-            if (cancelled_) return;
             for (const Sketch& s : sketches) sketch.add(s);
         }
         cover(node, sketch);
@@ -381,6 +374,7 @@ private:
 
     // The node's ellipsoid.
     void cover(Node& node, const Sketch& sketch) {
+        checkpoint();
         std::vector<Vec> core = without_repeats(sketch.points());
         Fit fit;
         for (int round = 0; round < kRounds; ++round) {
@@ -402,7 +396,7 @@ private:
         const auto reach = [&](const Fit& decoded) {
             double largest = 0;
             for_each_corner(node, [&](const Vec& p) { largest = std::max(largest, decoded.radial_squared(p)); });
-            return std::sqrt(largest);
+            return std::sqrt(largest) + radial_margin(decoded, options_.margin);
         };
         const auto packed = covering_node(fit, lattice_, reach);
         if (!packed) {
@@ -421,8 +415,7 @@ private:
     void report(uint32_t triangles) {
         const uint64_t before = done_.fetch_add(triangles), step = count_ / 64 + 1;
         if (!options_.progress || before / step == (before + triangles) / step) return;
-        const std::lock_guard lock(reporting_);
-        if (!options_.progress(static_cast<double>(before + triangles) / (2.0 * count_))) cancelled_ = true;
+        options_.progress(static_cast<double>(before + triangles) / (2.0 * count_));
     }
 
     // ---- the file's order ----
@@ -482,9 +475,8 @@ private:
     std::vector<Halves> binary_;
     std::vector<Choice> choices_; // of the binary nodes, most_lanes() for each
 
-    std::atomic<bool> cancelled_ = false, too_large_ = false;
+    std::atomic<bool> too_large_ = false;
     std::atomic<uint64_t> done_ = 0;
-    std::mutex reporting_;
 };
 
 } // namespace

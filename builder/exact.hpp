@@ -16,8 +16,9 @@ struct ExactOptions {
     uint32_t degree;
     uint32_t leaf_triangles; ///< at most, 1 ... kMaxLeafTriangles
     double min_radius;       ///< metres; keeps flat nodes from flat ellipsoids
-    /// Called now and then, from one thread at a time, with the share that is done; return false to cancel.
-    std::function<bool(double)> progress;
+    double margin;           ///< metres; ellipsoids hold all points within it of their triangles
+    /// Called now and then with the share that is done.
+    std::function<void(double)> progress;
 };
 
 /// All that an exact tree's file holds.
@@ -30,8 +31,8 @@ struct ExactTree {
     format::PackedTriangles packed() const { return {vertices, triangles, components}; }
 };
 
-/// Builds the exact tree of a cleaned mesh; the same for any number of threads. Fails with cancelled, or with bad_mesh
-/// if the format cannot hold the mesh's size.
+/// Builds the exact tree of a cleaned mesh; the same for any number of threads. Fails with bad_mesh if the format
+/// cannot hold the mesh's size.
 Result<ExactTree> grow_exact(MeshView mesh, const ExactOptions& options);
 
 } // namespace prolate

@@ -20,9 +20,18 @@ Eigen3x3 eigen_of(const Mat& q) {
     return eigen_symmetric(a);
 }
 
-// Points plus, along each principal axis in which they are too thin for the axis ratio cap, a pair of points that
-// thickens them: a flat set has no minimum-volume ellipsoid of positive volume, and the cap would widen it anyway.
-std::vector<Vec> with_thickness(std::span<const Vec> points, double min_radius) {
+// Points in coordinates middle + axes x in which they fill the cube [-1, 1]^3, whatever their unit, place and attitude,
+// and however thin they are: minimum volume is the same in all of them, but numbers of like size keep their digits.
+struct Whitened {
+    std::vector<Vec> points;
+    Vec middle;
+    Mat axes;
+};
+
+// The principal axes, as long as the points reach. Along each in which they are too thin for the axis ratio cap there
+// is a pair of points more: a flat set has no minimum-volume ellipsoid of positive volume, and the cap would widen it
+// anyway.
+Whitened whitened(std::span<const Vec> points, double min_radius) {
     Vec mean = Vec::Zero();
     for (const Vec& p : points) mean += p;
     mean /= static_cast<double>(points.size());
@@ -40,15 +49,22 @@ std::vector<Vec> with_thickness(std::span<const Vec> points, double min_radius) 
         }
         widest = std::max(widest, 0.5 * (high[a] - low[a]));
     }
-    std::vector<Vec> out(points.begin(), points.end());
+    Whitened out;
     const double thinnest = std::max(min_radius, widest / kMaxAxisRatio);
-    Vec middle = mean;
-    for (size_t a = 0; a < 3; ++a) middle += 0.5 * (low[a] + high[a]) * axis[a];
-    for (size_t a = 0; a < 3; ++a)
-        if (0.5 * (high[a] - low[a]) < thinnest) {
-            out.push_back(middle + thinnest * axis[a]);
-            out.push_back(middle - thinnest * axis[a]);
-        }
+    out.middle = mean;
+    for (size_t a = 0; a < 3; ++a) out.middle += 0.5 * (low[a] + high[a]) * axis[a];
+    std::vector<Vec> more;
+    Mat inverse;
+    for (int a = 0; a < 3; ++a) {
+        const auto i = static_cast<size_t>(a);
+        const double half = 0.5 * (high[i] - low[i]), length = std::max(half, thinnest);
+        out.axes.col(a) = length * axis[i];
+        inverse.row(a) = axis[i].transpose() / length;
+        if (half < thinnest) more.insert(more.end(), {Vec::Unit(a), -Vec::Unit(a)});
+    }
+    out.points.reserve(points.size() + more.size());
+    for (const Vec& p : points) out.points.push_back(inverse * (p - out.middle));
+    out.points.insert(out.points.end(), more.begin(), more.end());
     return out;
 }
 
@@ -106,11 +122,11 @@ double Fit::reach(std::span<const Vec> points) const {
     return std::sqrt(largest);
 }
 
-Fit capped(const Vec& center, const Mat& q, double min_radius) {
+Fit capped(const Vec& center, const Mat& q, double min_radius, double max_ratio) {
     const Eigen3x3 axes = eigen_of(q);
     double radii[3];
     for (size_t i = 0; i < 3; ++i) radii[i] = std::sqrt(std::max(axes.values[i], 0.0));
-    const double floor = std::max(min_radius, radii[0] / kMaxAxisRatio);
+    const double floor = std::max(min_radius, radii[0] / max_ratio);
     if (radii[2] >= floor) return {center, cholesky(q)};
     Mat widened = Mat::Zero();
     for (size_t i = 0; i < 3; ++i) {
@@ -121,27 +137,21 @@ Fit capped(const Vec& center, const Mat& q, double min_radius) {
     return {center, cholesky(widened)};
 }
 
-bool within_caps(const Fit& fit, double min_radius) {
+bool within_caps(const Fit& fit, double min_radius, double max_ratio) {
     // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
     const double inverse = fit.inverse.norm();
-    if (fit.factor.norm() * inverse <= kMaxAxisRatio && inverse * min_radius <= 1) return true;
+    if (fit.factor.norm() * inverse <= max_ratio && inverse * min_radius <= 1) return true;
     const Eigen3x3 axes = eigen_of(fit.factor * fit.factor.transpose());
-    const double thinnest = axes.values[2] * (1 + 1e-9); // capped() itself gets there only up to rounding
-    return thinnest * kMaxAxisRatio * kMaxAxisRatio >= axes.values[0] && thinnest >= min_radius * min_radius;
+    const double thinnest = axes.values[2] * (1 + 1e-6); // capped() itself gets there only up to rounding
+    return thinnest * max_ratio * max_ratio >= axes.values[0] && thinnest >= min_radius * min_radius;
 }
 
 Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double tolerance) {
-    const std::vector<Vec> points = with_thickness(input, min_radius);
+    const auto [points, middle, axes] = whitened(input, min_radius);
     const size_t n = points.size();
     constexpr double kDimension = 4; // of the lifted points (x, 1)
-
-    // Normalise, so that the moment matrix is well scaled whatever the unit and the place.
-    Box box;
-    for (const Vec& p : points) box.add(p);
-    const Vec shift = box.center();
-    const double scale = 1 / std::max(0.5 * box.size().maxCoeff(), min_radius);
     std::vector<Eigen::Vector4d> lifted(n);
-    for (size_t i = 0; i < n; ++i) lifted[i] << (points[i] - shift) * scale, 1;
+    for (size_t i = 0; i < n; ++i) lifted[i] << points[i], 1;
 
     // Start from extreme points along a few directions (Kumar and Yildirim 2005): the weights stay sparse.
     std::vector<double> weight(n, 0);
@@ -218,8 +228,10 @@ Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double to
         const Vec d = lifted[i].head<3>() - mean;
         q += 3 * weight[i] * d * d.transpose();
     }
-    const Fit fit = capped(mean / scale + shift, q / (scale * scale), min_radius);
-    return fit.scaled(std::max(fit.reach(points), 1e-3));
+    const Fit fit = capped(middle + axes * mean, axes * q * axes.transpose(), min_radius, kMaxAxisRatio);
+    double reach = fit.reach(input);
+    for (const Vec& p : points) reach = std::max(reach, fit.radial(middle + axes * p).norm());
+    return fit.scaled(std::max(reach, 1e-3));
 }
 
 std::span<const Vec> sketch_directions() {

@@ -3,16 +3,19 @@
 
 #include "builder/eigen.hpp"
 
-#include <prolate/types.hpp>
+#include <prolate/build.hpp>
 
 #include <span>
 #include <vector>
 
 namespace prolate {
 
-/// Largest ratio of two semi-axes that the bake makes. Needles and sheets beyond it are covered by several nodes or a
-/// thicker one. Bounding it bounds the rounding error of float separation tests (design: at most 30 - 50).
-inline constexpr double kMaxAxisRatio = 40;
+/// Largest ratio of two semi-axes that the bake makes: nodes that need to be thinner are thicker (build.hpp). The
+/// runtime's tests are right at any ratio; this is about as thin as the format's integers keep an ellipsoid's shape.
+inline constexpr double kMaxAxisRatio = 1 / kThinnestNode;
+/// The same while ellipsoids are guided by the distance field, which shows nothing much thinner: polish() thins them
+/// out at its end.
+inline constexpr double kMaxGuidedRatio = 40;
 
 /// The ellipsoid {center + L u : |u| <= 1} while it is being fitted, L lower triangular.
 struct Fit {
@@ -46,16 +49,16 @@ struct Fit {
 /// Lower Cholesky factor of the symmetric positive definite `q`, in a fixed order of operations.
 Mat cholesky(const Mat& q);
 
-/// Ellipsoid with the shape matrix `q` (symmetric positive definite), its axis ratio brought down to kMaxAxisRatio and
+/// Ellipsoid with the shape matrix `q` (symmetric positive definite), its axis ratio brought down to `max_ratio` and
 /// its radii up to `min_radius` by lengthening short axes.
-Fit capped(const Vec& center, const Mat& q, double min_radius);
+Fit capped(const Vec& center, const Mat& q, double min_radius, double max_ratio = kMaxGuidedRatio);
 
 /// Does `fit` keep to those bounds, up to rounding? What capped() returns does.
-bool within_caps(const Fit& fit, double min_radius);
+bool within_caps(const Fit& fit, double min_radius, double max_ratio = kMaxGuidedRatio);
 
-/// Minimum-volume ellipsoid around `points` (any number above 0, also coplanar or equal ones), capped, to a relative
-/// error of about `tolerance` in radius. It contains the points up to rounding.
-/// Khachiyan's algorithm with away steps (Todd and Yildirim 2007). O(n) an iteration: give it a core set.
+/// Minimum-volume ellipsoid around `points` (any number above 0, also coplanar or equal ones), capped at kMaxAxisRatio,
+/// to a relative error of about `tolerance` in radius. It contains the points up to rounding. Khachiyan's algorithm
+/// with away steps (Todd and Yildirim 2007). O(n) an iteration: give it a core set.
 Fit enclosing_ellipsoid(std::span<const Vec> points, double min_radius, double tolerance = 1e-3);
 
 /// Directions in which a point set is sketched: evenly spread over the sphere.

@@ -1,8 +1,7 @@
 #include "builder/grow.hpp"
 
+#include "builder/job.hpp"
 #include "builder/random.hpp"
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <chrono>
@@ -30,9 +29,15 @@ constexpr double kMostShareOfAll = 2.0 / 3; // degree + 1 parts have less: such 
 constexpr size_t kMostUnits = 512;          // that merge into the groups of a node; of more leaves, some are one unit
 constexpr double kReheat = 10;              // kappa at the start of a cycle
 constexpr int kRounds = 12;                 // at most, of a search for the count that meets a limit
+constexpr double kLeastWorth = 0.5;         // of a further leaf, in means of those that are there
 constexpr double kMet = 0.999;              // of a limit: quantisation will add a little
 constexpr double kCountTolerance = 1.1;     // the search ends this close to the least count
 constexpr double kLeastGain = 0.999;        // a level must bring the outside volume down to less than this much
+// What a tree's leaves may have outside, times what as many have that nothing above them limits. build.hpp
+// promises 1.3; the rest is for what is estimated on the way.
+constexpr double kMostLoss = 1.27;
+constexpr double kMostFewer = 1.25;   // leaves; with fewer still, there is room for more
+constexpr double kMostSettling = 1.4; // a set that all but covers seldom gains more volume when it has to cover
 
 class Grower {
 public:
@@ -52,7 +57,7 @@ public:
         else if (goal.tolerance > 0 || goal.distance > 0)
             grow_upwards(meet_limits());
         else
-            grow_downwards(goal.levels ? goal.levels : 3);
+            grow_levels(goal.levels ? goal.levels : 3);
         if (!cancelled()) tidy();
         return std::move(grown_);
     }
@@ -60,11 +65,22 @@ public:
 private:
     using Clock = std::chrono::steady_clock;
 
-    // A set of ellipsoids that covers, and which piece belongs to which.
-    struct Solved {
+    struct Leaf {
+        Fit fit;
+        std::vector<uint32_t> pieces;
+        uint32_t parent = 0; // among those of its task
+    };
+    // A set of ellipsoids that all but covers, as descents leave it.
+    struct Approach {
         EllipsoidSet set;
-        std::vector<uint32_t> owner; // of each piece
-        double outside = HUGE_VAL;   // cubic metres
+        double error = HUGE_VAL; // see approximate_error()
+    };
+    // One that covers.
+    struct Solved {
+        std::vector<Leaf> leaves;
+        std::vector<std::vector<Fit>> chains; // as the task's, perhaps larger
+        double outside = HUGE_VAL;            // cubic metres
+        double settling = 1;                  // times the volume outside before it was made to cover
     };
     // What a set is made for: some parents, each with its cells and the number of children it is to have.
     struct Task {
@@ -85,10 +101,15 @@ private:
     }
 
     // Thin solids, and surfaces that enclose none, are measured by their area.
+    double scale_by_volume(size_t count) const {
+        return kShapeScale * std::cbrt(solid_volume_ / static_cast<double>(count));
+    }
+    double scale_by_area(size_t count) const {
+        return kThinShapeScale * std::sqrt(solid_.area / static_cast<double>(count));
+    }
+    bool thin(size_t count) const { return scale_by_area(count) > scale_by_volume(count); }
     Objective objective(size_t count) const {
-        const double n = static_cast<double>(count);
-        const double scale =
-            std::max(kShapeScale * std::cbrt(solid_volume_ / n), kThinShapeScale * std::sqrt(solid_.area / n));
+        const double scale = std::max(scale_by_volume(count), scale_by_area(count));
         return {double{options_.build.alpha}, double{options_.build.beta}, scale};
     }
 
@@ -108,14 +129,16 @@ private:
 
     // --- one set ----------------------------------------------------------------------------------------------------
 
-    Solved solve(const Task& task, const std::function<void(double)>& progress) {
-        Effort effort = options_.effort;
+    Solved solve(const Task& task, const Effort& effort, const std::function<void(double)>& progress) {
+        return settle(task, approach(task, effort, progress));
+    }
+
+    Approach approach(const Task& task, Effort effort, const std::function<void(double)>& progress) {
         if (task.cells.size() == 1) // few ellipsoids cost little, and more depends on where they start
             effort.starts *= std::clamp(static_cast<int>(kManyStarts / task.children), 1, kMostStarts);
         const int rounds = effort.starts + effort.cycles;
-        EllipsoidSet best;
+        Approach best;
         std::vector<uint32_t> best_owner;
-        double least = HUGE_VAL;
         gather_points(task);
         for (int start = 0; start < effort.starts && !cancelled(); ++start) {
             std::vector<uint32_t> owner;
@@ -123,21 +146,71 @@ private:
             descend_set(set, owner, effort.iterations, 1, start,
                         [&](double done) { progress(0.9 * (start + done) / rounds); });
             const double error = approximate_error(set);
-            if (error < least || best.fits.empty()) least = error, best = std::move(set), best_owner = std::move(owner);
+            if (error < best.error || best.set.fits.empty()) best = {std::move(set), error}, best_owner.swap(owner);
         }
         for (int cycle = 0; cycle < effort.cycles && !cancelled(); ++cycle) {
-            EllipsoidSet set = best;
+            EllipsoidSet set = best.set;
             descend_set(set, best_owner, effort.iterations / 2, kReheat, effort.starts + cycle,
                         [&](double done) { progress(0.9 * (effort.starts + cycle + done) / rounds); });
             const double error = approximate_error(set);
-            if (error < least) least = error, best = std::move(set);
+            if (error < best.error) best = {std::move(set), error};
         }
+        return best;
+    }
+
+    Solved settle(const Task& task, Approach approach) {
         if (cancelled()) return {};
-        refine_seams(pieces_, best);
-        Solved out{std::move(best), {}, 0};
-        out.owner = polish_set(out.set);
-        out.outside = outside_of(out.set.fits);
+        EllipsoidSet& set = approach.set;
+        refine_seams(pieces_, set);
+        const std::vector<uint32_t> owner = polish_set(set);
+        std::vector<std::vector<Leaf>> below(task.cells.size());
+        std::vector<Leaf> all(set.fits.size());
+        for (size_t i = 0; i < all.size(); ++i) all[i] = {set.fits[i], {}, set.parent.empty() ? 0 : set.parent[i]};
+        for (uint32_t piece = 0; piece < owner.size(); ++piece) all[owner[piece]].pieces.push_back(piece);
+        std::erase_if(all, [](const Leaf& leaf) { return leaf.pieces.empty(); });
+        const double outside = outside_of(fits_of(all));
+        // Places of those that were redundant go to halves, where one more is worth about as much as the others.
+        for (const Leaf& leaf : all) below[leaf.parent].push_back(leaf);
+        Solved out;
+        for (std::vector<Leaf>& leaves : below) {
+            halve(leaves, task.children, kLeastWorth * outside / static_cast<double>(all.size()));
+            std::ranges::move(leaves, std::back_inserter(out.leaves));
+        }
+        if (out.leaves.size() > all.size()) out.outside = outside_of(fits_of(out.leaves));
+        if (!(out.outside < outside)) out.leaves = std::move(all), out.outside = outside;
+        out.settling = outside / approach.error;
+        out.chains = std::move(set.chains);
         return out;
+    }
+
+    static std::vector<Fit> fits_of(std::span<const Leaf> leaves) {
+        std::vector<Fit> out;
+        out.reserve(leaves.size());
+        for (const Leaf& leaf : leaves) out.push_back(leaf.fit);
+        return out;
+    }
+
+    // Halves the leaf that sticks out most, and then the next, until there are `count`: only such as then stick out by
+    // at least `worth` cubic metres less.
+    void halve(std::vector<Leaf>& leaves, size_t count, double worth) const {
+        if (leaves.size() >= count) return;
+        std::vector<double> outside;
+        const auto look = [&](const Leaf& leaf) { return leaf.pieces.size() > 1 ? outside_volume_(leaf.fit) : -1; };
+        for (const Leaf& leaf : leaves) outside.push_back(look(leaf));
+        while (leaves.size() < count) {
+            const auto most = static_cast<size_t>(std::ranges::max_element(outside) - outside.begin());
+            if (outside.empty() || outside[most] < 0) return;
+            const Leaf whole = leaves[most];
+            const auto place = [&](uint32_t piece) { return pieces_.center(piece); };
+            const auto [a, b] = divide(whole.pieces, place, whole.pieces.size() / 2);
+            Leaf low{part_of(whole.fit, a), a, whole.parent}, high{part_of(whole.fit, b), b, whole.parent};
+            if (outside_volume_(low.fit) + outside_volume_(high.fit) + worth > outside[most]) {
+                outside[most] = -1;
+                continue;
+            }
+            outside[most] = look(low), outside.push_back(look(high));
+            leaves[most] = std::move(low), leaves.push_back(std::move(high));
+        }
     }
 
     double approximate_error(const EllipsoidSet& set) const {
@@ -155,14 +228,16 @@ private:
     CoverVolume measure(std::span<const Fit> fits) const { return measure_cover(solid_.columns, ellipsoids_of(fits)); }
     double outside_of(std::span<const Fit> fits) const { return measure(fits).outside.value; }
 
+    static bool merges(const Task& task) { return task.children * task.cells.size() <= kMergeLimit; }
+
     EllipsoidSet start_set(const Task& task, int start, std::vector<uint32_t>& owner) const {
         const bool few = task.children <= kFew && task.cells.size() == 1;
-        const bool merging = task.children <= kMergeLimit && (start % 2 == 0) == few;
+        const bool merging = merges(task) && (start % 2 == 0) == few;
         const auto seed = options_.build.seed + static_cast<uint64_t>(start);
         const uint32_t pieces_per_cluster =
             kPiecesPerCluster[static_cast<size_t>(start) / 2 % std::size(kPiecesPerCluster)];
         std::vector<std::vector<Cluster>> clusters(task.cells.size());
-        tbb::parallel_for(size_t{0}, task.cells.size(), [&](size_t p) {
+        parallel_for(size_t{0}, task.cells.size(), [&](size_t p) {
             if (merging)
                 clusters[p] = merge_start(solid_.cells, task.cells[p], task.children, pieces_per_cluster,
                                           options_.min_radius, outside_volume_);
@@ -238,31 +313,87 @@ private:
 
     // --- downwards --------------------------------------------------------------------------------------------------
 
-    void grow_downwards(uint32_t levels) {
+    // Level by level. Where a level of so many nodes gains nothing, the next one is split off the same parents: what a
+    // shell's eight children cannot do, their 64 children can, and a ball's cannot either. The levels left out are then
+    // grown upwards between the two.
+    void grow_levels(uint32_t levels) {
         std::vector<uint32_t> parents{0};
-        double outside = outside_of({&grown_.nodes[0].fit, 1});
-        double done = 0, all = 0; // work, in nodes
-        for (uint32_t l = 1; l <= levels; ++l) all += std::pow(options_.build.degree, l);
-        for (uint32_t level = 1; level <= levels && !cancelled(); ++level) {
-            const double share = std::pow(options_.build.degree, level);
+        const double root_outside = outside_of({&grown_.nodes[0].fit, 1});
+        double outside = root_outside;
+        double settling = 1;
+        size_t count = 1;
+        uint32_t level = 0; // of the parents
+        double done = 0, all = most_nodes(levels);
+        for (uint32_t l = 1; l <= levels; ++l) all += most_nodes(l);
+        const auto step = [&](double share) {
+            return [this, share, &done, &all](double part) { report((done + part * share) / all); };
+        };
+        bool limited = false; // the lowest level, by those above
+        for (uint32_t l = 1; l <= levels && !cancelled(); ++l) {
             const uint32_t piece_count = pieces_.size();
-            const Solved solved = solve(task_below(parents), [&](double part) { report((done + part * share) / all); });
-            done += share;
+            const Task task = task_below(parents, l - level);
+            Effort effort = options_.effort;
+            if (l == levels && !task.chains.empty() && !merges(task)) // the set that nothing limits stands in for one
+                effort.starts = std::max(1, effort.starts - 1);
+            const Solved solved = solve(task, effort, step(most_nodes(l)));
+            done += most_nodes(l);
             if (cancelled()) return;
-            if (solved.outside >= kLeastGain * outside) { // as for a ball
-                grown_.goal_reached = false;
+            if (solved.outside >= kLeastGain * outside) {
                 follow_cuts(grown_.nodes, piece_count);
-                return;
+                continue;
             }
-            outside = solved.outside;
-            parents = attach(solved, parents);
+            outside = solved.outside, settling = solved.settling, count = solved.leaves.size();
+            if (count == 1) { // the root itself, a little better
+                grown_.nodes[0].fit = solved.leaves[0].fit;
+                follow_cuts(grown_.nodes, piece_count);
+                continue;
+            }
+            limited = !task.chains.empty();
+            parents = attach(solved, parents, l - level);
+            level = l;
+            end_level(l);
+        }
+        if (level > 0 && (level < levels || limited)) {
+            // Seams of the levels above are seams of the leaves: that costs some volume. Too much, or all that a level
+            // could have gained, and the tree is grown upwards from a set that nothing limits.
+            const auto keep = [&](double free_outside, size_t free_count) {
+                if (level < levels) return kLeastGain * outside <= free_outside;
+                const double steepness = std::log(root_outside / free_outside) / std::log(free_count); // as errors fall
+                const double fewer = std::min(static_cast<double>(free_count) / static_cast<double>(count), kMostFewer);
+                return outside <= kMostLoss * free_outside * std::pow(fewer, std::clamp(steepness, 0.0, 1.0));
+            };
+            const uint32_t piece_count = pieces_.size();
+            Effort effort = options_.effort;
+            effort.starts = 1, effort.cycles = 0;
+            const Task task = task_below({0}, levels);
+            Approach free = approach(task, effort, step(most_nodes(levels)));
+            if (cancelled()) return;
+            const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
+            if (thin(task.children) ||
+                !keep(estimate, free.set.fits.size())) { // what thin parts are uncovered is not in it
+                const Solved solved = settle(task, std::move(free));
+                if (cancelled()) return;
+                if (keep(solved.outside, solved.leaves.size())) {
+                    follow_cuts(grown_.nodes, piece_count);
+                } else {
+                    grown_.nodes.resize(1);
+                    attach(solved, {0}, levels);
+                    level = levels;
+                }
+            }
             end_level(level);
         }
+        grown_.goal_reached = level == levels;
     }
 
-    Task task_below(const std::vector<uint32_t>& parents) const {
+    // Of a level, by the degree.
+    double most_nodes(uint32_t level) const { return std::pow(options_.build.degree, level); }
+
+    // Sets of so many levels below the parents.
+    Task task_below(const std::vector<uint32_t>& parents, uint32_t levels) const {
         Task task;
-        task.children = options_.build.degree;
+        const double most = std::max<double>(options_.build.degree, kMaxLeaves / static_cast<double>(parents.size()));
+        task.children = static_cast<uint32_t>(std::min(most_nodes(levels), most));
         if (parents.size() == 1 && parents[0] == 0) {
             task.cells = {all_cells()};
             return task;
@@ -300,35 +431,19 @@ private:
         return out;
     }
 
-    // Makes nodes of the ellipsoids that own something, as children of `parents`, whose pieces become their children's.
-    // Returns the new nodes.
-    std::vector<uint32_t> attach(const Solved& solved, const std::vector<uint32_t>& parents) {
-        std::vector<std::vector<uint32_t>> pieces(solved.set.fits.size());
-        for (uint32_t piece = 0; piece < solved.owner.size(); ++piece) pieces[solved.owner[piece]].push_back(piece);
-        for (const uint32_t p : parents) grown_.nodes[p].pieces.clear();
-        for (size_t p = 0; p < solved.set.chains.size(); ++p) { // the polish may have enlarged them
+    // Makes nodes of the ellipsoids that own something, `levels` below `parents`. Returns the new leaves.
+    std::vector<uint32_t> attach(const Solved& solved, const std::vector<uint32_t>& parents, uint32_t levels) {
+        for (size_t p = 0; p < solved.chains.size(); ++p) { // the polish may have enlarged them
             uint32_t node = parents[p];
-            for (const Fit& fit : solved.set.chains[p]) {
+            for (const Fit& fit : solved.chains[p]) {
                 if (fit.volume() > grown_.nodes[node].fit.volume()) grown_.nodes[node].fit = fit;
                 node = grown_.nodes[node].parent;
             }
         }
-        std::vector<uint32_t> added;
-        for (uint32_t p = 0; p < parents.size(); ++p) {
-            grown_.nodes[parents[p]].first_child = static_cast<uint32_t>(grown_.nodes.size());
-            for (size_t i = 0; i < pieces.size(); ++i) {
-                if (pieces[i].empty() || (solved.set.parent.empty() ? 0 : solved.set.parent[i]) != p) continue;
-                added.push_back(static_cast<uint32_t>(grown_.nodes.size()));
-                GrownNode node;
-                node.fit = solved.set.fits[i];
-                node.level = grown_.nodes[parents[p]].level + 1;
-                node.parent = parents[p];
-                node.pieces = pieces[i];
-                grown_.nodes.push_back(std::move(node));
-                ++grown_.nodes[parents[p]].child_count;
-            }
-        }
-        return added;
+        std::vector<Group> groups(parents.size());
+        for (size_t p = 0; p < parents.size(); ++p) groups[p].node = parents[p];
+        for (uint32_t i = 0; i < solved.leaves.size(); ++i) groups[solved.leaves[i].parent].members.push_back(i);
+        return grow_between(std::move(groups), solved.leaves, levels);
     }
 
     // Pieces that were cut since `count` there were belong to whom their wholes belong. Owners: nodes or leaves.
@@ -372,37 +487,14 @@ private:
 
     // --- upwards ----------------------------------------------------------------------------------------------------
 
-    struct Leaf {
-        Fit fit;
-        std::vector<uint32_t> pieces;
-    };
-
     std::vector<Leaf> solve_flat(uint32_t count, const std::function<void(double)>& progress) {
         Task task;
         task.children = count;
         task.cells = {all_cells()};
-        const Solved solved = solve(task, progress);
+        std::vector<Leaf> leaves = solve(task, options_.effort, progress).leaves;
         if (cancelled()) return {};
-        std::vector<Leaf> leaves(solved.set.fits.size());
-        for (size_t i = 0; i < leaves.size(); ++i) leaves[i].fit = solved.set.fits[i];
-        for (uint32_t piece = 0; piece < solved.owner.size(); ++piece)
-            leaves[solved.owner[piece]].pieces.push_back(piece);
-        std::erase_if(leaves, [](const Leaf& leaf) { return leaf.pieces.empty(); });
-        while (leaves.size() < count) {
-            // Some were redundant. Halve the largest, and then the next: the count is what was asked for.
-            const auto largest = std::max_element(leaves.begin(), leaves.end(), [](const Leaf& a, const Leaf& b) {
-                return (a.pieces.size() > 1 ? a.fit.volume() : 0) < (b.pieces.size() > 1 ? b.fit.volume() : 0);
-            });
-            if (largest->pieces.size() < 2) {
-                grown_.goal_reached = false;
-                break;
-            }
-            const auto place = [&](uint32_t piece) { return pieces_.center(piece); };
-            auto [a, b] = divide(largest->pieces, place, largest->pieces.size() / 2);
-            const Fit whole = largest->fit;
-            *largest = {part_of(whole, a), a};
-            leaves.push_back({part_of(whole, b), b});
-        }
+        halve(leaves, count, -HUGE_VAL); // the count is what was asked for
+        if (leaves.size() < count) grown_.goal_reached = false;
         return leaves;
     }
 
@@ -453,10 +545,7 @@ private:
             std::vector<Leaf> leaves = solve_flat(count, [&](double part) { report((round + part) / kRounds); });
             if (cancelled()) return {};
             if (!best.empty()) follow_cuts(best, piece_count);
-            std::vector<Fit> fits;
-            fits.reserve(leaves.size());
-            for (const Leaf& leaf : leaves) fits.push_back(leaf.fit);
-            const double now = excess(fits), most = static_cast<double>(best.size()); // 0: unknown
+            const double now = excess(fits_of(leaves)), most = static_cast<double>(best.size()); // 0: unknown
             const bool met = now <= kMet;
             if (met) {
                 best = std::move(leaves);
@@ -479,62 +568,82 @@ private:
         return best;
     }
 
-    // A tree over `leaves`, about as high as the degree needs: in each group, those merge that fit together best.
+    // A tree over `leaves`, about as high as the degree needs.
     void grow_upwards(const std::vector<Leaf>& leaves) {
         if (cancelled() || leaves.size() < 2) return;
+        std::vector<Group> root(1);
+        root[0].members.resize(leaves.size());
+        std::iota(root[0].members.begin(), root[0].members.end(), 0u);
+        grow_between(std::move(root), leaves, 0);
+    }
+
+    // Some leaves that are to be below a node.
+    struct Group {
+        uint32_t node = 0;
+        std::vector<uint32_t> members; // rising
+    };
+
+    // Makes nodes of `leaves`, below those of their groups, whose pieces become theirs, and of the groups between:
+    // those merge that fit together best. The leaves are at most `levels` below; 0: as many as it takes. Returns their
+    // nodes.
+    std::vector<uint32_t> grow_between(std::vector<Group> groups, const std::vector<Leaf>& leaves, uint32_t levels) {
         std::vector<Sketch> sketches(leaves.size());
         std::vector<Fit> fits;
-        for (size_t i = 0; i < leaves.size(); ++i) {
-            for (const uint32_t piece : leaves[i].pieces) sketches[i].add(pieces_.points(piece));
-            fits.push_back(leaves[i].fit);
+        std::vector<std::vector<uint32_t>> touching;
+        if (levels != 1) {
+            for (size_t i = 0; i < leaves.size(); ++i) {
+                for (const uint32_t piece : leaves[i].pieces) sketches[i].add(pieces_.points(piece));
+                fits.push_back(leaves[i].fit);
+            }
+            touching = neighbours_of(fits, 1);
         }
-        const std::vector<std::vector<uint32_t>> touching = neighbours_of(fits, 1);
-
-        // Breadth-first, so that the children of a node are consecutive.
-        struct Group {
-            uint32_t node;
-            std::vector<uint32_t> members; // leaves
-        };
-        std::vector<Group> groups(1);
-        groups[0].node = 0;
-        groups[0].members.resize(leaves.size());
-        std::iota(groups[0].members.begin(), groups[0].members.end(), 0u);
-        grown_.nodes[0].pieces.clear();
-        for (uint32_t level = 1; !groups.empty(); ++level) {
+        for (const Group& group : groups) grown_.nodes[group.node].pieces.clear();
+        std::vector<uint32_t> made;
+        for (uint32_t left = levels; !groups.empty(); --left) { // breadth-first: children of a node are consecutive
             std::vector<std::vector<std::vector<uint32_t>>> parts(groups.size());
-            tbb::parallel_for(size_t{0}, groups.size(),
-                              [&](size_t g) { parts[g] = parts_of(groups[g].members, fits, sketches, touching); });
+            const size_t most = levels == 0 ? 0 : static_cast<size_t>(std::min(most_nodes(left - 1), 0x1p32));
+            parallel_for(size_t{0}, groups.size(), [&](size_t g) {
+                parts[g] = parts_of(groups[g].members, most, fits, sketches, touching);
+            });
             std::vector<Group> next;
+            uint32_t level = 0;
             for (size_t g = 0; g < groups.size(); ++g) {
                 const uint32_t parent = groups[g].node;
+                level = grown_.nodes[parent].level + 1;
                 grown_.nodes[parent].first_child = static_cast<uint32_t>(grown_.nodes.size());
                 grown_.nodes[parent].child_count = static_cast<uint32_t>(parts[g].size());
                 for (std::vector<uint32_t>& part : parts[g]) {
+                    const auto index = static_cast<uint32_t>(grown_.nodes.size());
                     GrownNode node;
                     node.level = level;
                     node.parent = parent;
                     if (part.size() == 1) {
                         node.fit = leaves[part[0]].fit;
                         node.pieces = leaves[part[0]].pieces;
+                        made.push_back(index);
                     } else {
                         std::vector<uint32_t> pieces;
                         for (const uint32_t leaf : part)
                             pieces.insert(pieces.end(), leaves[leaf].pieces.begin(), leaves[leaf].pieces.end());
                         node.fit = fit_around(pieces);
-                        next.push_back({static_cast<uint32_t>(grown_.nodes.size()), std::move(part)});
+                        next.push_back({index, std::move(part)});
                     }
                     grown_.nodes.push_back(std::move(node));
                 }
             }
             groups.swap(next);
-            if (groups.empty()) end_level(level);
+            if (groups.empty() && levels == 0) end_level(level);
         }
+        return made;
     }
 
-    // Some leaves in as many groups as a node has children, none of them much larger than its share, if that can be.
-    std::vector<std::vector<uint32_t>> parts_of(const std::vector<uint32_t>& members, std::span<const Fit> fits,
-                                                std::span<const Sketch> sketches,
+    // Some leaves in as many groups as a node has children, of at most `most` leaves each; 0: none of them much larger
+    // than its share, if that can be.
+    std::vector<std::vector<uint32_t>> parts_of(const std::vector<uint32_t>& members, size_t most,
+                                                std::span<const Fit> fits, std::span<const Sketch> sketches,
                                                 std::span<const std::vector<uint32_t>> touching) const {
+        const uint32_t degree = options_.build.degree;
+        if (members.size() <= degree) return singly(members);
         const std::vector<std::vector<uint32_t>> units = halved(members, fits, std::min(members.size(), kMostUnits));
         std::vector<Sketch> own(units.size());
         std::map<uint32_t, uint32_t> unit_of; // of each leaf
@@ -546,16 +655,25 @@ private:
                 if (const auto found = unit_of.find(other); found != unit_of.end() && found->second != unit)
                     neighbours[unit].push_back(found->second);
 
-        const uint32_t degree = options_.build.degree;
-        const double share = std::min(kMostShare / degree, kMostShareOfAll);
-        const auto most = static_cast<size_t>(std::ceil(share * static_cast<double>(units.size())));
+        const double share = std::min(kMostShare / degree, kMostShareOfAll) * static_cast<double>(units.size());
+        const size_t most_units =
+            most ? std::max<size_t>(1, most * units.size() / members.size()) : static_cast<size_t>(std::ceil(share));
         std::vector<std::vector<uint32_t>> parts;
         for (const std::vector<uint32_t>& group :
-             merge_groups(own, neighbours, degree, most, options_.min_radius, outside_volume_)) {
+             merge_groups(own, neighbours, degree, most_units, options_.min_radius, outside_volume_)) {
             std::vector<uint32_t>& part = parts.emplace_back();
             for (const uint32_t unit : group) part.insert(part.end(), units[unit].begin(), units[unit].end());
+            std::sort(part.begin(), part.end());
         }
-        return parts;
+        const auto too_large = [&](const std::vector<uint32_t>& part) { return most && part.size() > most; };
+        // Merging gets stuck where all are nearly full. Equal shares fit.
+        return std::ranges::any_of(parts, too_large) ? halved(members, fits, degree) : parts;
+    }
+
+    static std::vector<std::vector<uint32_t>> singly(const std::vector<uint32_t>& leaves) {
+        std::vector<std::vector<uint32_t>> out;
+        for (const uint32_t leaf : leaves) out.push_back({leaf});
+        return out;
     }
 
     // Leaves in `count` units of about the same size, by place.

@@ -2,7 +2,11 @@
 //
 // A level is optimised as a whole, as a set: start, descent, polish. Levels are grown downwards when levels are asked
 // for - the ellipsoids of a level then see those above as limits, see EllipsoidSet - and upwards from the leaves when a
-// number of leaves, a tolerance or a distance is.
+// number of leaves, a tolerance or a distance is. Some solids have no use for a few ellipsoids, but for many: no eight
+// ellipsoids fit a shell better than one, and 64 do. There a level is grown downwards and those between upwards; so is
+// the whole tree where its limits cost the leaves too much.
+//
+// Sets are compared by the volume of their union outside the solid. Of a mesh without an inside, that is all of it.
 #pragma once
 
 #include "builder/columns.hpp"

@@ -1,10 +1,9 @@
 #include "builder/hausdorff.hpp"
 
 #include "builder/fit.hpp"
+#include "builder/job.hpp"
 
 #include <Eigen/Geometry>
-
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -90,7 +89,7 @@ public:
         sample(samples, out);
         // Each ellipsoid starts from the samples' maximum and not from its neighbours', which depend on the threads.
         std::vector<Bounds> bounds(fits_.size());
-        tbb::parallel_for(size_t{0}, fits_.size(), [&](size_t i) { bounds[i] = supremum(i, out.max, tolerance); });
+        parallel_for(size_t{0}, fits_.size(), [&](size_t i) { bounds[i] = supremum(i, out.max, tolerance); });
         double upper = out.max;
         for (const Bounds& b : bounds) {
             out.max = std::max(out.max, b.lower);
@@ -131,7 +130,7 @@ private:
         const BoxTree tree(boxes);
         std::vector<std::vector<BoundaryPoint>> points(fits_.size());
         const auto spread = [&](double area_per_point) {
-            tbb::parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
+            parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
                 std::vector<uint32_t> neighbours;
                 tree.visit(boxes[i], [&](uint32_t j) {
                     if (j != i) neighbours.push_back(j);
@@ -149,8 +148,8 @@ private:
         out.area = spread(visible / count);
 
         std::vector<std::vector<Sample>> own(fits_.size());
-        tbb::parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
-            for (const auto& [p, area] : points[i]) own[i].push_back({distance(p), area});
+        parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
+            for (const auto& [p, area] : points[i]) own[i].push_back({distance(p), area}), checkpoint();
         });
         std::vector<Sample> all;
         for (const auto& samples : own) all.insert(all.end(), samples.begin(), samples.end());
@@ -188,7 +187,9 @@ private:
     std::vector<BoundaryPoint> boundary_points(size_t own, const std::vector<uint32_t>& neighbours,
                                                double count) const {
         std::vector<BoundaryPoint> out;
+        Checkpoints checkpoints;
         for (double k = 0; k < count; ++k) {
+            checkpoints();
             // A Fibonacci lattice (Gonzalez 2010), turned differently for each ellipsoid.
             const double z = 1 - (2 * k + 1) / count, r = std::sqrt(1 - z * z);
             const double turn = (k + 0.618 * static_cast<double>(own)) * (3 - std::sqrt(5.0)) * std::numbers::pi;
@@ -268,6 +269,7 @@ private:
         consider(Vec::Constant(-1), Vec::Constant(1), HUGE_VAL);
         const Vec lengths(axes_[i].radii);
         while (!cells.empty() && cells.top().upper > lower + tolerance) {
+            checkpoint();
             if (number > kMostCells) return {lower, cells.top().upper};
             const Cell cell = cells.top();
             cells.pop();

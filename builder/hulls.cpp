@@ -8,9 +8,9 @@
 #include "builder/hulls.hpp"
 
 #include "builder/fit.hpp"
-#include "src/bytes.hpp"
+#include "builder/job.hpp"
 
-#include <tbb/parallel_for.h>
+#include "src/bytes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,8 @@ namespace prolate {
 namespace {
 
 constexpr int kMostSteps = 200;
-// More than rounding costs anywhere below, in unit-ball coordinates: double, and ellipsoids of axis ratios below 100.
+// More than rounding costs anywhere below, in unit-ball coordinates: in double, some 2^-53 times the axis ratio, which
+// is at most 2^14.
 constexpr double kRounding = 1e-9;
 
 // An upper bound on the distance of w from the convex hull of the points, close to it if it is above `enough`.
@@ -54,9 +55,11 @@ std::vector<Vec> choose(const std::vector<Vec>& w) {
     };
     out.push_back(w[farthest([&](size_t i) { return w[i].squaredNorm(); }).first]);
     std::vector<double> distance(w.size(), HUGE_VAL); // from the hull so far, at most
+    Checkpoints checkpoints;
     while (out.size() < kHullPoints) {
         double most = 0; // those that were nearer need not be looked at again
         const auto [next, gap] = farthest([&](size_t i) {
+            checkpoints();
             if (distance[i] > most)
                 distance[i] = distance_from_hull(out, w[i], most), most = std::max(most, distance[i]);
             return distance[i];
@@ -99,7 +102,7 @@ void describe(const TreeView& tree, uint32_t node, std::byte* record) {
         }
     const Hull hull(record);
     double most = hull.distance(Vec::Zero(), 0); // the center, too: FORMAT.md
-    for (const Vec& x : w) most = std::max(most, hull.distance(x, most));
+    for (const Vec& x : w) most = std::max(most, hull.distance(x, most)), checkpoint();
     const double share = std::ceil((most + kRounding) * kHullShares);
     store_le(record + kHullShare, static_cast<uint8_t>(share <= kHullShares ? share : 0));
 }
@@ -118,7 +121,7 @@ double Hull::distance(const Vec& w, double enough) const {
 
 std::vector<std::byte> hulls_of(const TreeView& tree) {
     std::vector<std::byte> out(size_t{tree.block_count()} * kHullBytes);
-    tbb::parallel_for(uint32_t{0}, tree.slot_count(), [&](uint32_t node) {
+    parallel_for(uint32_t{0}, tree.slot_count(), [&](uint32_t node) {
         if (!tree.is_node(node)) return;
         const ChildRange children = tree.children(node);
         if (children.count > 0) describe(tree, node, out.data() + size_t{children.first / kBlockLanes} * kHullBytes);

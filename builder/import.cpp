@@ -1,38 +1,19 @@
-// load_mesh(): reads a mesh file through Assimp.
-//
-// Assimp is lenient where this library must not be: a hole in the mesh because half of the file is missing would be a
-// solid that is not covered. builder/import_checks.cpp therefore looks at the bytes first.
-//
-// Coordinates stay as the file has them. Assimp puts its conversion of units and up axis (DAE, 3DS) into the transform
-// of the scene's root, and that one is left out for those two formats.
-//
-// Known limits: Assimp reads decimal numbers to within one unit in the last place of a float, so the mesh, and the
-// cover that is promised for it, is the text's mesh to that precision. Skinning and morphing are not applied.
-#include "builder/import_checks.hpp"
+// load_mesh(): from a file to a mesh. Each format has its reader (polygons.hpp), which gives polygons in double
+// precision; here they are placed, rounded to float, and cut into triangles.
+#include "builder/polygons.hpp"
+#include "builder/triangulate.hpp"
 
-#include "src/bytes.hpp"
 #include "src/hash.hpp"
 
+#include <prolate/build.hpp>
 #include <prolate/mesh.hpp>
 
-#include <assimp/Importer.hpp>
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-#include <assimp/version.h>
-
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <limits>
-#include <memory>
+#include <cstdio>
 #include <new>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -40,6 +21,11 @@
 
 namespace prolate {
 namespace {
+
+// Rounding to float may move points by this share of the mesh's diagonal.
+constexpr double kMostRounding = 1e-5;
+// Polygons count as flat if no corner is farther from their plane, as a share of the mesh's diagonal.
+constexpr double kFlat = 1e-5;
 
 Error io(const char* what) {
     return {ErrorCode::io, what, static_cast<uint64_t>(errno)};
@@ -82,146 +68,186 @@ Result<std::string> read_all(const char* path) {
     return bytes;
 }
 
-// An affine map in double precision: Assimp's own products of matrices are rounded to float at each step.
-struct Transform {
-    double m[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-
-    explicit Transform() = default;
-    explicit Transform(const aiMatrix4x4& a)
-        : m{{a.a1, a.a2, a.a3, a.a4}, {a.b1, a.b2, a.b3, a.b4}, {a.c1, a.c2, a.c3, a.c4}} {}
-
-    Transform operator*(const Transform& inner) const {
-        Transform out;
-        for (size_t i = 0; i < 3; ++i)
-            for (size_t j = 0; j < 4; ++j) {
-                out.m[i][j] = j == 3 ? m[i][3] : 0;
-                for (size_t k = 0; k < 3; ++k) out.m[i][j] += m[i][k] * inner.m[k][j];
-            }
-        return out;
-    }
-    Vec3 operator()(const aiVector3D& p) const {
-        const auto row = [&](size_t i) {
-            return static_cast<float>(m[i][0] * p.x + m[i][1] * p.y + m[i][2] * p.z + m[i][3]);
-        };
-        return {row(0), row(1), row(2)};
-    }
-    bool mirrors() const {
-        return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-                   m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
-               0;
-    }
-};
-
-// Appends one instance of `from`.
-Result<void> append(Mesh& out, const aiMesh& from, const Transform& transform) {
-    if (out.vertices.size() + from.mNumVertices > std::numeric_limits<uint32_t>::max())
-        return Error{ErrorCode::bad_file, "the scene has too many vertices (2^32 or more)"};
-    const uint32_t base = static_cast<uint32_t>(out.vertices.size());
-    const size_t old_triangles = out.triangles.size();
-    for (const aiFace& face : std::span(from.mFaces, from.mNumFaces)) {
-        if (face.mNumIndices != 3) continue; // points and lines; polygons are triangles by now
-        Triangle t;
-        for (unsigned i = 0; i < 3; ++i) {
-            if (face.mIndices[i] >= from.mNumVertices)
-                return Error{ErrorCode::bad_file, "a face names a vertex that does not exist"};
-            t[i] = base + face.mIndices[i];
-        }
-        if (transform.mirrors()) std::swap(t[1], t[2]);
-        out.triangles.push_back(t);
-    }
-    if (out.triangles.size() == old_triangles) return {};
-    for (const aiVector3D& p : std::span(from.mVertices, from.mNumVertices)) out.vertices.push_back(transform(p));
-    return {};
-}
-
-// Every mesh of every node; a mesh named by two nodes is there twice. No recursion: files may nest deeply.
-Result<Mesh> flatten(const aiScene& scene, bool skip_root_transform) {
-    struct Item {
-        const aiNode* node;
-        Transform transform;
-    };
-    Mesh out;
-    std::vector<Item> todo = {
-        {scene.mRootNode, skip_root_transform ? Transform() : Transform(scene.mRootNode->mTransformation)}};
-    while (!todo.empty()) {
-        const Item item = todo.back();
-        todo.pop_back();
-        for (const unsigned index : std::span(item.node->mMeshes, item.node->mNumMeshes)) {
-            if (index >= scene.mNumMeshes) return Error{ErrorCode::bad_file, "a node names a mesh that does not exist"};
-            if (const auto done = append(out, *scene.mMeshes[index], item.transform); !done) return done.error();
-        }
-        for (unsigned i = item.node->mNumChildren; i-- > 0;) {
-            const aiNode* child = item.node->mChildren[i];
-            todo.push_back({child, item.transform * Transform(child->mTransformation)});
-        }
-    }
+std::string words(const char* format, auto... values) {
+    char out[300];
+    std::snprintf(out, sizeof out, format, values...);
     return out;
 }
 
-// Faces of three or more corners, as check_mesh_bytes() counts them.
-uint64_t count_faces(const aiScene& scene) {
-    uint64_t faces = 0;
-    for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes))
-        for (const aiFace& face : std::span(mesh->mFaces, mesh->mNumFaces)) faces += face.mNumIndices >= 3;
-    return faces;
-}
-
-// Is there work for aiProcess_Triangulate? It aborts the program where a mesh is marked as having polygons and has
-// none, and that is what a face of no corners leads to.
-Result<bool> find_polygons(const aiScene& scene) {
-    bool any = false;
-    for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes)) {
-        bool here = false;
-        for (const aiFace& face : std::span(mesh->mFaces, mesh->mNumFaces)) {
-            if (face.mNumIndices == 0) return Error{ErrorCode::bad_file, "a face has no corners"};
-            here |= face.mNumIndices > 3;
-        }
-        if (here != ((mesh->mPrimitiveTypes & aiPrimitiveType_POLYGON) != 0))
-            return Error{ErrorCode::bad_file, "the reader contradicts itself on the file's polygons"};
-        any |= here;
-    }
-    return any;
-}
-
-Result<Mesh> load_or_throw(const char* path, std::string& detail) {
+Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
     const std::string type = extension(path);
-    auto bytes = read_all(path);
+    constexpr std::string_view kTexts[] = {".obj", ".off", ".ply", ".stl"};
+    const bool is_own = std::find(std::begin(kTexts), std::end(kTexts), type) != std::end(kTexts);
+    const bool is_gltf = type == ".gltf" || type == ".glb", is_assimps = type == ".dae" || type == ".3ds";
+    const auto bytes = read_all(path.c_str());
     if (!bytes) return bytes.error();
+    if (!is_own && !is_gltf && !is_assimps && type != ".3mf")
+        return Error{ErrorCode::bad_file, "unknown kind of mesh file"};
     if (bytes->empty()) return Error{ErrorCode::bad_file, "the file is empty"};
-    const auto expected_faces = check_mesh_bytes(type, *bytes, detail);
-    if (!expected_faces) return expected_faces.error();
-    *bytes = {};
+    if (bytes->starts_with("\xFF\xFE") || bytes->starts_with("\xFE\xFF"))
+        return Error{ErrorCode::bad_file, "text in UTF-16; save it as UTF-8"};
+    if (bytes->starts_with("version https://git-lfs"))
+        return Error{ErrorCode::bad_file, "a pointer of Git LFS, not the file itself; fetch it with 'git lfs pull'"};
+    if (is_own) return read_text_or_binary(type, *bytes, detail);
+    if (is_gltf) return read_gltf(type, *bytes, path, detail);
+    if (type == ".3mf") return read_3mf(*bytes, detail);
+    if (type == ".dae" && bytes->find("<ph>") != bytes->npos)
+        return Error{ErrorCode::bad_file, "polygons with holes (<ph>), which are not read; export triangles"};
+    return read_with_assimp(type, path, detail);
+}
 
-    Assimp::Importer importer;
-    importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
-    const aiScene* scene = importer.ReadFile(path, 0);
-    if (scene) {
-        if (*expected_faces && **expected_faces != count_faces(*scene))
-            return Error{ErrorCode::bad_file, "the reader dropped some of the file's faces"};
-        const auto polygons = find_polygons(*scene);
-        if (!polygons) return polygons.error();
-        if (*polygons) scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+struct Extent {
+    Point low = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+
+    explicit Extent(const std::vector<Point>& points, const std::vector<uint32_t>& corners) {
+        for (const uint32_t corner : corners)
+            for (size_t k = 0; k < 3; ++k) {
+                low[k] = std::min(low[k], points[corner][k]);
+                high[k] = std::max(high[k], points[corner][k]);
+            }
     }
-    if (!scene || !scene->mRootNode) {
-        detail = importer.GetErrorString();
-        return Error{ErrorCode::bad_file, "cannot be read as a mesh"};
+    double diagonal() const { return std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]); }
+    double largest() const {
+        double out = 0;
+        for (size_t k = 0; k < 3; ++k) out = std::max({out, std::abs(low[k]), std::abs(high[k])});
+        return out;
     }
-    auto mesh = flatten(*scene, type == ".dae" || type == ".3ds");
-    if (mesh && mesh->triangles.empty()) return Error{ErrorCode::bad_file, "the file has no triangles"};
+    // The middle, in whole steps of a power of two of about a quarter of the diagonal.
+    Point middle() const {
+        const double step = std::exp2(std::floor(std::log2(diagonal())) - 1);
+        Point out{};
+        for (size_t k = 0; k < 3 && step > 0; ++k) out[k] = std::round((low[k] + high[k]) / 2 / step) * step;
+        return out;
+    }
+};
+
+// The distance from a float of this size to the next.
+double spacing(double coordinate) {
+    const auto x = static_cast<float>(coordinate);
+    return double{std::nextafter(x, HUGE_VALF)} - double{x};
+}
+
+// Moves and scales the points; says how.
+Result<Placement> place(Polygons& polygons, const ImportOptions& options, ImportReport& report) {
+    Placement placement;
+    for (size_t k = 0; k < 3; ++k) placement.scale[k] = options.unit.value_or(polygons.unit) * options.scale[k];
+    const double read_spacing = spacing(Extent(polygons.points, polygons.corners).largest());
+    double largest_scale = 0;
+    for (const double s : placement.scale) largest_scale = std::max(largest_scale, std::abs(s));
+    for (Point& p : polygons.points)
+        for (size_t k = 0; k < 3; ++k) p[k] *= placement.scale[k];
+    const Extent there(polygons.points, polygons.corners);
+    const double diagonal = there.diagonal();
+    if (options.origin)
+        placement.origin = *options.origin;
+    else if (options.recentre)
+        placement.origin = there.middle();
+    if (placement.origin != Point{}) {
+        for (Point& p : polygons.points)
+            for (size_t k = 0; k < 3; ++k) p[k] -= placement.origin[k];
+        report.notes.push_back(
+            words("taken around a local origin, (%.12g, %.12g, %.12g): all coordinates are relative to it",
+                  placement.origin[0], placement.origin[1], placement.origin[2]));
+    }
+    const auto lost = [&](double moved) {
+        return words("points would move by %.2g m, and the mesh is %.3g m across", moved, diagonal);
+    };
+    if (polygons.points_are_rounded && diagonal > 0 && read_spacing * largest_scale > kMostRounding * diagonal) {
+        report.detail = lost(read_spacing * largest_scale / 2);
+        return Error{ErrorCode::bad_mesh,
+                     "the mesh lies too far from (0, 0, 0) for the single precision that this format "
+                     "is read in; move it there, or export it as OBJ"};
+    }
+    const double step = spacing(Extent(polygons.points, polygons.corners).largest());
+    if (diagonal > 0 && step > kMostRounding * diagonal) {
+        report.detail = lost(step / 2);
+        return Error{
+            ErrorCode::bad_mesh,
+            "the mesh lies too far from (0, 0, 0) for single precision; give it a local origin with --recentre"};
+    }
+    return placement;
+}
+
+// Rounds to float and cuts polygons into triangles.
+Result<Mesh> to_mesh(const Polygons& polygons, const Placement& placement, ImportReport& report) {
+    Mesh mesh;
+    mesh.placement = placement;
+    mesh.vertices.reserve(polygons.points.size());
+    for (const Point& p : polygons.points)
+        mesh.vertices.push_back({static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])});
+    const bool mirrors =
+        std::count_if(placement.scale.begin(), placement.scale.end(), [](double s) { return s < 0; }) % 2 == 1;
+    const double diagonal = Extent(polygons.points, polygons.corners).diagonal();
+    uint64_t cut = 0, bent = 0;
+    double most_bent = 0;
+    std::vector<uint32_t> face;
+    size_t first = 0;
+    for (size_t f = 0; f < polygons.sizes.size(); first += polygons.sizes[f++]) {
+        const auto begin = polygons.corners.begin() + static_cast<ptrdiff_t>(first);
+        face.assign(begin, begin + polygons.sizes[f]);
+        if (mirrors) std::reverse(face.begin() + 1, face.end());
+        if (face.size() > 3) {
+            ++cut;
+            if (const double away = distance_from_flat(mesh.vertices, face); away > kFlat * diagonal)
+                ++bent, most_bent = std::max(most_bent, away);
+        }
+        if (triangulate(mesh.vertices, face, mesh.triangles)) continue;
+        report.detail = words("%s %u, %zu corners", polygons.place_word, polygons.places[f], face.size());
+        return Error{ErrorCode::bad_file, "a polygon that crosses itself; triangulate it in the program that made it"};
+    }
+    if (bent > 0)
+        report.notes.push_back(
+            words("%llu of %llu polygons are not flat, by up to %.3g m: the triangles that they were cut "
+                  "into are what is covered",
+                  static_cast<unsigned long long>(bent), static_cast<unsigned long long>(cut), most_bent));
     return mesh;
 }
 
-// The JSON of a glTF or GLB file. (GLB: a header of 12 bytes, then chunks of length, type, content; JSON is the first.)
-std::string_view gltf_json(std::string_view type, std::string_view bytes) {
-    if (type == ".gltf") return bytes;
-    if (bytes.size() < 20) return {};
-    const auto length = load_le<uint32_t>(std::as_bytes(std::span(bytes)).data() + 12);
-    return bytes.substr(20, length);
+// The first face with a coordinate that is no number or too large for a float.
+Result<void> check_finite(const Polygons& polygons, const ImportOptions& options, std::string& detail) {
+    double scale = 0;
+    for (const double s : options.scale) scale = std::max(scale, std::abs(s * options.unit.value_or(polygons.unit)));
+    size_t first = 0;
+    for (size_t f = 0; f < polygons.sizes.size(); first += polygons.sizes[f++])
+        for (size_t i = first; i < first + polygons.sizes[f]; ++i)
+            for (const double coordinate : polygons.points[polygons.corners[i]])
+                if (!(std::abs(coordinate) * scale <= double{std::numeric_limits<float>::max()})) {
+                    detail = words("%s %u", polygons.place_word, polygons.places[f]);
+                    return Error{ErrorCode::bad_file, std::isfinite(coordinate)
+                                                          ? "a coordinate too large for single precision; scale it down"
+                                                          : "a coordinate that is not finite"};
+                }
+    return {};
+}
+
+Result<Mesh> load_or_throw(const char* path, const ImportOptions& options, ImportReport& report) {
+    auto polygons = read_polygons(path, report.detail);
+    if (!polygons) return polygons.error();
+    report.notes = std::move(polygons->notes);
+    if (polygons->sizes.empty()) return Error{ErrorCode::bad_file, "the file has no triangles"};
+    if (const auto finite = check_finite(*polygons, options, report.detail); !finite) return finite.error();
+    const auto placement = place(*polygons, options, report);
+    if (!placement) return placement.error();
+    return to_mesh(*polygons, *placement, report);
+}
+
+Result<void> check(const ImportOptions& options) {
+    const auto bad = [](const char* what) { return Error{ErrorCode::bad_options, what}; };
+    if (options.unit && !(std::isfinite(*options.unit) && *options.unit > 0)) return bad("the unit must be above 0");
+    for (const double s : options.scale)
+        if (!std::isfinite(s) || s == 0) return bad("the scale must not be 0");
+    for (const double o : options.origin.value_or(Point{}))
+        if (!std::isfinite(o)) return bad("the origin must be finite");
+    return {};
 }
 
 } // namespace
 
-std::optional<uint64_t> hash_mesh_file(const char* path) try {
+ImportOptions placed_as(const Placement& placement) {
+    return {.unit = 1, .scale = placement.scale, .recentre = false, .origin = placement.origin};
+}
+
+std::optional<uint64_t> hash_mesh_file(const char* path, const ImportOptions& options) try {
     const std::string type = extension(path);
     const auto bytes = read_all(path);
     if (!bytes) return {};
@@ -231,24 +257,29 @@ std::optional<uint64_t> hash_mesh_file(const char* path) try {
         const std::string_view json = gltf_json(type, *bytes);
         if (json.empty() || json.find("uri") != json.npos || json.find('\\') != json.npos) return {};
     }
-    const unsigned version[] = {aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch()};
-    const uint64_t reader = hash_bytes(std::as_bytes(std::span(type)), hash_bytes(std::as_bytes(std::span(version))));
-    return hash_bytes(std::as_bytes(std::span(*bytes)), reader);
+    const Point origin = options.origin.value_or(Point{});
+    const double taken[] = {
+        options.unit.value_or(0),   options.scale[0], options.scale[1], options.scale[2], options.recentre ? 1.0 : 0.0,
+        options.origin ? 1.0 : 0.0, origin[0],        origin[1],        origin[2]};
+    const uint64_t reader[] = {assimp_version(), kBuilderVersion, hash_bytes(std::as_bytes(std::span(type)))};
+    const uint64_t how = hash_bytes(std::as_bytes(std::span(taken)), hash_bytes(std::as_bytes(std::span(reader))));
+    return hash_bytes(std::as_bytes(std::span(*bytes)), how);
 } catch (const std::bad_alloc&) {
     return {};
 }
 
-Result<Mesh> load_mesh(const char* path, std::string* detail) {
-    std::string unused;
-    std::string& words = detail ? *detail : unused;
+Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportReport* report) {
+    ImportReport unused;
+    ImportReport& out = report ? *report : unused;
+    if (const auto valid = check(options); !valid) return valid.error();
     try {
-        words.clear();
-        return load_or_throw(path, words);
+        out = {};
+        return load_or_throw(path, options, out);
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::bad_file, "the mesh does not fit into memory"};
+        return Error{ErrorCode::out_of_memory, "the mesh does not fit into memory"};
     } catch (const std::exception& e) {
         try {
-            words = e.what();
+            out.detail = e.what();
         } catch (...) { // no memory left for the words
         }
         return Error{ErrorCode::bad_file, "cannot be read as a mesh"};

@@ -1,17 +1,24 @@
 // clean(): welds and diagnoses a triangle mesh.
 //
-// Vertices are merged by exact position only (-0 equals +0); a tolerance would move the surface, and the cover is
-// promised for the surface as given. So nothing is ever dropped that could lose a point of it:
+// Vertices are merged by exact position (-0 equals +0). Nothing is ever dropped that could lose a point of the surface:
 //  - a triangle with a repeated corner is a segment or a point. It goes if that lies in a triangle that stays. The
 //    edge balance does not change: its two edges a->b and b->a cancel.
 //  - a triangle with three distinct collinear corners stays. It costs nothing, and in a closed mesh it often closes
 //    the seam between one long edge and two short ones.
 //
+// Vertices that nearly coincide are joined only at open edges, and only if all edges cancel thereafter: to know an
+// inside is worth a little move. Corner by corner a triangle then moves by the weld distance at most, and so do all its
+// points, for they are convex combinations of its corners; the cover holds a margin of that width around the surface.
+//
 // By sorting, so O(n log n) for every input, and the same result everywhere: vertices and triangles keep their order.
-// Known limits: nearly equal positions are not merged (such a mesh is reported as open); duplicated triangles stay.
+// Known limit: duplicated triangles stay.
 #include <prolate/mesh.hpp>
 
+#include "builder/shells.hpp"
+
 #include "src/hash.hpp"
+
+#include <prolate/tree.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -19,14 +26,20 @@
 #include <limits>
 #include <new>
 #include <stdexcept>
+#include <unordered_map>
 
 namespace prolate {
 namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr double kSmallest = 1e-24; // diagonal: a leaf of kThinnestNodeOfMesh needs an exponent that the format has
+constexpr float kWeldSpacings = 8;                   // of kDefaultWeld
 
 bool is_finite(const Vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+bool within_limit(const Vec3& v) {
+    return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}) <= kLargestCoordinate;
 }
 
 // For each vertex, the first vertex at the same position.
@@ -86,16 +99,89 @@ std::vector<Side> sorted_sides(std::span<const Triangle> triangles) {
     return sides;
 }
 
-void classify_edges(std::span<const Side> sides, MeshReport& report) {
-    for (size_t i = 0; i < sides.size();) {
-        size_t end = i;
+// Calls visit(side, balance of directions, number of sides) for each edge.
+template <class Visit> void for_each_edge(std::span<const Side> sides, Visit&& visit) {
+    for (size_t i = 0, end = 0; i < sides.size(); i = end) {
         int64_t balance = 0;
-        for (; end < sides.size() && !before(sides[i], sides[end]); ++end) balance += sides[end].sign;
-        report.open_edges += balance != 0;
-        report.non_manifold_edges += end - i >= 3;
-        i = end;
+        for (end = i; end < sides.size() && !before(sides[i], sides[end]); ++end) balance += sides[end].sign;
+        visit(sides[i], balance, end - i);
     }
+}
+
+void classify_edges(std::span<const Side> sides, MeshReport& report) {
+    report.open_edges = report.non_manifold_edges = 0;
+    for_each_edge(sides, [&](const Side&, int64_t balance, size_t count) {
+        report.open_edges += balance != 0;
+        report.non_manifold_edges += count >= 3;
+    });
     report.closed = report.open_edges == 0;
+}
+
+double distance(const Vec3& a, const Vec3& b) {
+    return std::hypot(double{a.x} - b.x, double{a.y} - b.y, double{a.z} - b.z);
+}
+
+// For each vertex the one that it joins: the nearest earlier one that stays, within `tolerance`; itself if there is
+// none, or if it is on no open edge. Those that stay are farther apart than the tolerance, so a cell has but a few.
+std::vector<uint32_t> joined_vertices(std::span<const Vec3> vertices, std::span<const Side> sides, double tolerance) {
+    std::vector<uint32_t> to(vertices.size());
+    for (uint32_t i = 0; i < to.size(); ++i) to[i] = i;
+    std::vector<bool> at_open_edge(vertices.size());
+    for_each_edge(sides, [&](const Side& side, int64_t balance, size_t) {
+        if (balance != 0) at_open_edge[side.low] = at_open_edge[side.high] = true;
+    });
+    using Cell = std::array<int64_t, 3>;
+    struct Hash {
+        size_t operator()(const Cell& cell) const { return hash_bytes(std::as_bytes(std::span(cell))); }
+    };
+    std::unordered_map<Cell, std::vector<uint32_t>, Hash> staying;
+    // Coordinates of cells, as far as they fit: beyond, a cell has more vertices in it, and nothing else changes.
+    const auto cell_of = [tolerance](float x) {
+        return static_cast<int64_t>(std::clamp(std::floor(x / tolerance), -9e15, 9e15));
+    };
+    for (uint32_t v = 0; v < vertices.size(); ++v) {
+        if (!at_open_edge[v]) continue;
+        const Cell own = {cell_of(vertices[v].x), cell_of(vertices[v].y), cell_of(vertices[v].z)};
+        double nearest = tolerance;
+        for (int64_t n = 0; n < 27; ++n) {
+            const auto found = staying.find({own[0] + n % 3 - 1, own[1] + n / 3 % 3 - 1, own[2] + n / 9 - 1});
+            if (found == staying.end()) continue;
+            for (const uint32_t other : found->second)
+                if (const double d = distance(vertices[v], vertices[other]); d <= nearest) nearest = d, to[v] = other;
+        }
+        if (to[v] == v) staying[own].push_back(v);
+    }
+    return to;
+}
+
+double default_weld(std::span<const Vec3> vertices, std::span<const Triangle> triangles) {
+    float largest = 0;
+    for (const Triangle& t : triangles)
+        for (const uint32_t corner : t) {
+            const Vec3& v = vertices[corner];
+            largest = std::max({largest, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+        }
+    return double{kWeldSpacings} * (double{std::nextafter(largest, HUGE_VALF)} - double{largest});
+}
+
+// Joins what closes the mesh, if anything does: changes triangles, sides and report.
+void close_by_welding(std::span<const Vec3> vertices, double tolerance, std::vector<Triangle>& triangles,
+                      std::vector<Side>& sides, std::vector<uint32_t>& representative, MeshReport& report) {
+    const std::vector<uint32_t> to = joined_vertices(vertices, sides, tolerance);
+    std::vector<Triangle> joined = triangles;
+    for (Triangle& t : joined)
+        for (uint32_t& corner : t) corner = to[corner];
+    std::vector<Side> new_sides = sorted_sides(joined);
+    MeshReport closed = report;
+    classify_edges(new_sides, closed);
+    if (!closed.closed || new_sides.empty()) return;
+    for (uint32_t v = 0; v < to.size(); ++v) {
+        if (to[v] == v) continue;
+        ++closed.welded_vertices;
+        closed.weld_distance = std::max(closed.weld_distance, distance(vertices[v], vertices[to[v]]));
+    }
+    for (uint32_t& r : representative) r = to[r];
+    triangles = std::move(joined), sides = std::move(new_sides), report = closed;
 }
 
 // Does the segment or point of a triangle with a repeated corner lie in a triangle without one?
@@ -124,13 +210,31 @@ void drop_unused(Mesh& mesh, MeshReport& report, std::span<const uint32_t> repre
         for (uint32_t& corner : t) corner = number[corner];
 }
 
-Result<CleanMesh> clean_or_throw(MeshView input) {
+// The size of the mesh's box, if a tree can hold it.
+Result<void> measure(const Mesh& mesh, MeshReport& report) {
+    const auto extent = [&mesh](float Vec3::*axis) {
+        const auto less = [axis](const Vec3& a, const Vec3& b) { return a.*axis < b.*axis; };
+        const auto [low, high] = std::minmax_element(mesh.vertices.begin(), mesh.vertices.end(), less);
+        return double{(*high).*axis} - (*low).*axis;
+    };
+    report.size = {extent(&Vec3::x), extent(&Vec3::y), extent(&Vec3::z)};
+    const double diagonal = std::hypot(report.size[0], report.size[1], report.size[2]);
+    if (diagonal < kSmallest)
+        return Error{ErrorCode::bad_mesh, "the mesh is less than 1e-24 m across; give it in another unit"};
+    return {};
+}
+
+Result<CleanMesh> clean_or_throw(MeshView input, float weld) {
+    if (std::isnan(weld)) return Error{ErrorCode::bad_options, "the weld tolerance must be a length"};
     constexpr size_t kMost = kNone - 1;
     if (input.triangles.empty()) return Error{ErrorCode::bad_mesh, "the mesh has no triangles"};
     if (input.vertices.size() > kMost || input.triangles.size() > kMost)
         return Error{ErrorCode::bad_mesh, "the mesh has too many vertices or triangles (2^32 or more)"};
-    for (size_t i = 0; i < input.vertices.size(); ++i)
+    for (size_t i = 0; i < input.vertices.size(); ++i) {
         if (!is_finite(input.vertices[i])) return Error{ErrorCode::bad_mesh, "vertex coordinate is not finite", i};
+        if (!within_limit(input.vertices[i]))
+            return Error{ErrorCode::bad_mesh, "vertex coordinate beyond 1.9e22 m (2^74); give the mesh in another unit", i};
+    }
     for (size_t i = 0; i < input.triangles.size(); ++i)
         for (const uint32_t corner : input.triangles[i])
             if (corner >= input.vertices.size())
@@ -141,14 +245,18 @@ Result<CleanMesh> clean_or_throw(MeshView input) {
     report.input_vertices = static_cast<uint32_t>(input.vertices.size());
     report.input_triangles = static_cast<uint32_t>(input.triangles.size());
 
-    const std::vector<uint32_t> representative = representatives(input.vertices);
+    std::vector<uint32_t> representative = representatives(input.vertices);
     for (uint32_t i = 0; i < representative.size(); ++i) report.merged_vertices += representative[i] != i;
     std::vector<Triangle> welded(input.triangles.begin(), input.triangles.end());
     for (Triangle& t : welded)
         for (uint32_t& corner : t) corner = representative[corner];
 
-    const std::vector<Side> sides = sorted_sides(welded);
+    std::vector<Side> sides = sorted_sides(welded);
     classify_edges(sides, report);
+    if (!report.closed && weld != 0) {
+        const double tolerance = weld > 0 ? double{weld} : default_weld(input.vertices, welded);
+        close_by_welding(input.vertices, tolerance, welded, sides, representative, report);
+    }
     std::vector<bool> is_corner(input.vertices.size());
     for (const Side& side : sides) is_corner[side.low] = is_corner[side.high] = true;
 
@@ -164,22 +272,27 @@ Result<CleanMesh> clean_or_throw(MeshView input) {
     // -0 and +0 were merged; which of them came first must not show in the result.
     for (Vec3& v : out.mesh.vertices) v = {v.x + 0.0f, v.y + 0.0f, v.z + 0.0f};
     drop_unused(out.mesh, report, representative);
+    out.mesh.placement = input.placement;
+    if (const auto fits = measure(out.mesh, report); !fits) return fits.error();
+    report.turned_shells = turn_shells(out.mesh);
     return out;
 }
 
 } // namespace
 
-Result<CleanMesh> clean(MeshView mesh) {
+Result<CleanMesh> clean(MeshView mesh, float weld) {
     try {
-        return clean_or_throw(mesh);
+        return clean_or_throw(mesh, weld);
     } catch (const std::bad_alloc&) {
     } catch (const std::length_error&) {
     }
-    return Error{ErrorCode::bad_mesh, "the mesh does not fit into memory"};
+    return Error{ErrorCode::out_of_memory, "the mesh does not fit into memory"};
 }
 
 uint64_t hash(MeshView mesh) noexcept {
-    return hash_bytes(std::as_bytes(mesh.triangles), hash_bytes(std::as_bytes(mesh.vertices)));
+    static_assert(sizeof(Placement) == 6 * sizeof(double));
+    return hash_bytes(std::as_bytes(std::span(&mesh.placement, 1)),
+                      hash_bytes(std::as_bytes(mesh.triangles), hash_bytes(std::as_bytes(mesh.vertices))));
 }
 
 } // namespace prolate

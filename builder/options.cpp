@@ -29,12 +29,13 @@ Result<void> validate(const BuildOptions& o) {
         return bad("an exact tree is made of ellipsoids", static_cast<uint64_t>(o.primitive));
     if (o.leaf_triangles < 1 || o.leaf_triangles > kMaxLeafTriangles)
         return bad("triangles in a leaf must be 1 to 127", o.leaf_triangles);
+    if (!std::isfinite(o.weld)) return bad("the weld tolerance must be a length", 0);
     if (o.threads > 1024) return bad("threads must be 0 (all cores) to 1024", o.threads);
     return {};
 }
 
 uint64_t hash(const BuildOptions& o) {
-    std::array<std::byte, 52> bytes{};
+    std::array<std::byte, 56> bytes{};
     std::byte* to = bytes.data();
     const auto put = [&to](auto value) {
         store_le(to, value);
@@ -42,7 +43,7 @@ uint64_t hash(const BuildOptions& o) {
     };
     put(kBuilderVersion), put(uint32_t{kFormatVersion});
     put(o.degree), put(o.levels), put(o.ellipsoids), put(o.tolerance), put(o.distance);
-    put(o.alpha), put(o.beta), put(o.seed);
+    put(o.alpha), put(o.beta), put(o.seed), put(o.weld);
     put(static_cast<uint8_t>(o.method)), put(static_cast<uint8_t>(o.primitive)), put(static_cast<uint8_t>(o.quality));
     put(static_cast<uint8_t>(o.exact ? o.leaf_triangles : 0));
     return hash_bytes(bytes);

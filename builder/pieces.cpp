@@ -1,6 +1,7 @@
 #include "builder/pieces.hpp"
 
 #include "builder/clip.hpp"
+#include "builder/job.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +49,7 @@ void Pieces::add_voxels(const Voxels& voxels) {
     for (size_t level = 0; level < whole.size(); ++level) {
         for (size_t a = 0; a < 3; ++a) extent[level][a] = (voxels.size()[a] + (1 << level) - 1) >> level;
         whole[level].resize(at(level, extent[level][0] - 1, extent[level][1] - 1, extent[level][2] - 1) + 1);
-        for (int i = 0; i < extent[level][0]; ++i)
+        for (int i = 0; i < extent[level][0]; ++i, checkpoint())
             for (int j = 0; j < extent[level][1]; ++j)
                 for (int k = 0; k < extent[level][2]; ++k) {
                     bool all = true;
@@ -65,6 +66,7 @@ void Pieces::add_voxels(const Voxels& voxels) {
     }
     std::vector<Vec> points;
     for (uint32_t cell = 0; cell < voxels.cell_count(); ++cell) {
+        checkpoint();
         const auto& [i, j, k] = voxels.coordinates(cell);
         size_t level = 0;
         while (level + 1 < whole.size() &&
@@ -167,6 +169,7 @@ bool Pieces::cut(const Piece& whole, const std::array<int, 3>& low, Piece& part)
 }
 
 bool Pieces::refine(uint32_t piece) {
+    checkpoint();
     const Piece whole = pieces_[piece];
     if (whole.side == 1) return false;
     bool first = true;
@@ -193,13 +196,15 @@ bool Pieces::refine(uint32_t piece) {
 
 double reach_of(const Fit& fit, const Pieces& pieces, std::span<const uint32_t> members) {
     double reach = 0;
-    for (const uint32_t piece : members) reach = std::max(reach, fit.reach(pieces.points(piece)));
+    Checkpoints checkpoints;
+    for (const uint32_t piece : members) reach = std::max(reach, fit.reach(pieces.points(piece))), checkpoints();
     return reach;
 }
 
 Fit fit_pieces(const Pieces& pieces, std::span<const uint32_t> members, double min_radius) {
     Sketch sketch;
-    for (const uint32_t piece : members) sketch.add(pieces.points(piece));
+    Checkpoints checkpoints;
+    for (const uint32_t piece : members) sketch.add(pieces.points(piece)), checkpoints();
     std::vector<Vec> core(sketch.points().begin(), sketch.points().end());
     std::sort(core.begin(), core.end(), before);
     core.erase(std::unique(core.begin(), core.end()), core.end());
@@ -214,6 +219,7 @@ Fit fit_pieces(const Pieces& pieces, std::span<const uint32_t> members, double m
         reach = 1;
         const double shortest_inverse = fit.inverse.norm();
         for (const uint32_t piece : members) {
+            checkpoints();
             if (std::sqrt(fit.radial_squared(pieces.center(piece))) + pieces.radius(piece) * shortest_inverse <= 1)
                 continue;
             double worst = 1;

@@ -1,10 +1,8 @@
 #include "builder/polish.hpp"
 
 #include "builder/cover.hpp"
+#include "builder/job.hpp"
 #include "builder/random.hpp"
-
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -21,7 +19,8 @@ constexpr double kMargin = 1.2;       // ellipsoids may grow so much before neig
 constexpr int kNeighbourInterval = 4; // sweeps
 constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
 constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
-constexpr double kAncestorCost = 10; // of a volume by which an ancestor grows: all its descendants' queries meet it
+constexpr double kAncestorCost = 10;  // of a volume by which an ancestor grows: all its descendants' queries meet it
+constexpr double kAlmostCapped = 0.9; // of the largest axis ratio of steps
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -122,12 +121,13 @@ public:
 
     std::vector<uint32_t> owners() {
         find_candidates();
+        const std::vector<bool> redundant = find_redundant();
         std::vector<uint32_t> owner(pieces_.size(), kNobody);
         std::vector<double> nearest(pieces_.size(), HUGE_VAL);
         for (uint32_t i = 0; i < fits_.size(); ++i)
             for (size_t c = 0; c < candidates_[i].size(); ++c) {
                 const uint32_t piece = candidates_[i][c];
-                if (!held_[i][c]) continue;
+                if (!held_[i][c] || redundant[i]) continue;
                 const double radial = fits_[i].radial_squared(pieces_.center(piece));
                 if (radial < nearest[piece]) nearest[piece] = radial, owner[piece] = i;
             }
@@ -137,22 +137,33 @@ public:
 private:
     static constexpr uint32_t kNobody = UINT32_MAX;
 
+    // Ellipsoids that need not be there, as others hold all that they hold; small ones go first.
+    std::vector<bool> find_redundant() {
+        std::vector<uint32_t> order(fits_.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::vector<double> volume(fits_.size());
+        for (size_t i = 0; i < fits_.size(); ++i) volume[i] = fits_[i].volume();
+        std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return volume[a] < volume[b]; });
+        std::vector<bool> out(fits_.size(), false);
+        for (const uint32_t i : order)
+            if (held_alone(i).empty()) out[i] = true, count(i, -1);
+        return out;
+    }
+
     // For each ellipsoid, the pieces that it holds or may come to hold; and groups of ellipsoids far apart, that can
     // be moved at the same time.
     void find_candidates() {
         neighbours_ = neighbours_of(fits_, kMargin);
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, fits_.size(), 1), [&](const auto& range) {
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const Box box = box_of(fits_[i], kMargin);
-                candidates_[i].clear();
-                pieces_.for_each_near(box, [&](uint32_t piece) {
-                    const Vec& c = pieces_.center(piece);
-                    const double r = pieces_.radius(piece);
-                    if (((c - box.low).array() < -r).any() || ((box.high - c).array() < -r).any()) return;
-                    if (chain_holds(set_, i, pieces_, piece)) candidates_[i].push_back(piece);
-                });
-                find_held(i);
-            }
+        parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
+            const Box box = box_of(fits_[i], kMargin);
+            candidates_[i].clear();
+            pieces_.for_each_near(box, [&](uint32_t piece) {
+                const Vec& c = pieces_.center(piece);
+                const double r = pieces_.radius(piece);
+                if (((c - box.low).array() < -r).any() || ((box.high - c).array() < -r).any()) return;
+                if (chain_holds(set_, i, pieces_, piece)) candidates_[i].push_back(piece);
+            });
+            find_held(i);
         });
         count_holders();
 
@@ -232,16 +243,12 @@ private:
 
     void update(const std::vector<uint32_t>& group) {
         std::vector<Fit> next(group.size());
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, group.size(), 1), [&](const auto& range) {
-            for (size_t n = range.begin(); n != range.end(); ++n) next[n] = improved(group[n]);
-        });
+        parallel_for(size_t{0}, group.size(), [&](size_t n) { next[n] = improved(group[n]); });
         for (size_t n = 0; n < group.size(); ++n) {
             count(group[n], -1);
             fits_[group[n]] = next[n];
         }
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, group.size(), 1), [&](const auto& range) {
-            for (size_t n = range.begin(); n != range.end(); ++n) find_held(group[n]);
-        });
+        parallel_for(size_t{0}, group.size(), [&](size_t n) { find_held(group[n]); });
         for (const uint32_t i : group) count(i, +1);
     }
 
@@ -339,6 +346,18 @@ private:
     double best_error_ = HUGE_VAL, step_ = kFirstStep, reward_ = 0;
 };
 
+// What is as thin as steps may make it, though its pieces may be thinner: the least ellipsoid around them instead.
+void thin_out(EllipsoidSet& set, const Pieces& pieces, std::span<const uint32_t> owner, double min_radius) {
+    std::vector<std::vector<uint32_t>> owned(set.fits.size());
+    for (uint32_t piece = 0; piece < owner.size(); ++piece) owned[owner[piece]].push_back(piece);
+    parallel_for(size_t{0}, set.fits.size(), [&](size_t i) {
+        Fit& fit = set.fits[i];
+        if (owned[i].empty() || within_caps(fit, 0, kAlmostCapped * kMaxGuidedRatio)) return;
+        const Fit least = fit_pieces(pieces, owned[i], min_radius);
+        if (least.volume() < fit.volume()) fit = least;
+    });
+}
+
 } // namespace
 
 void refine_seams(Pieces& pieces, const EllipsoidSet& set) {
@@ -347,16 +366,14 @@ void refine_seams(Pieces& pieces, const EllipsoidSet& set) {
         const uint32_t count = pieces.size();
         std::vector<std::vector<uint32_t>> held(set.fits.size());
         const size_t known = settled.size();
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, set.fits.size(), 1), [&](const auto& range) {
-            for (size_t i = range.begin(); i != range.end(); ++i) {
-                const Fit large = set.fits[i].scaled(kNearlyHeld);
-                const double shortest_inverse = large.inverse.norm();
-                pieces.for_each_near(box_of(large, 1), [&](uint32_t piece) {
-                    if (piece < known && settled[piece]) return;
-                    if (holds(large, shortest_inverse, pieces, piece) && chain_holds(set, i, pieces, piece))
-                        held[i].push_back(piece);
-                });
-            }
+        parallel_for(size_t{0}, set.fits.size(), [&](size_t i) {
+            const Fit large = set.fits[i].scaled(kNearlyHeld);
+            const double shortest_inverse = large.inverse.norm();
+            pieces.for_each_near(box_of(large, 1), [&](uint32_t piece) {
+                if (piece < known && settled[piece]) return;
+                if (holds(large, shortest_inverse, pieces, piece) && chain_holds(set, i, pieces, piece))
+                    held[i].push_back(piece);
+            });
         });
         settled.resize(count, false);
         for (const std::vector<uint32_t>& list : held)
@@ -377,7 +394,9 @@ std::vector<uint32_t> polish(EllipsoidSet& set, const Pieces& pieces, const Dist
                              const PolishOptions& options) {
     Polisher polisher(set, pieces, field, options);
     polisher.run();
-    return polisher.owners();
+    std::vector<uint32_t> owner = polisher.owners();
+    thin_out(set, pieces, owner, options.min_radius);
+    return owner;
 }
 
 } // namespace prolate

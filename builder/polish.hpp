@@ -34,7 +34,7 @@ void refine_seams(Pieces& pieces, const EllipsoidSet& set);
 
 /// Makes `set` cover all pieces and lowers its error. Ancestors in the chains grow a little where that spares a child
 /// much: pieces on the seams of parents. Returns each piece's owner: the ellipsoid that holds it most
-/// centrally, itself and all of its chain. An ellipsoid that the others make redundant owns nothing.
+/// centrally, itself and all of its chain. Ellipsoids that the others make redundant own nothing.
 std::vector<uint32_t> polish(EllipsoidSet& set, const Pieces& pieces, const DistanceField& field,
                              const PolishOptions& options);
 

@@ -1,6 +1,7 @@
 #include "builder/start.hpp"
 
 #include "builder/descent.hpp"
+#include "builder/job.hpp"
 #include "builder/random.hpp"
 
 #include <algorithm>
@@ -127,6 +128,7 @@ private:
     };
 
     double error(const Sketch& sketch) const {
+        checkpoint();
         return outside_(enclosing_ellipsoid(sketch.points(), min_radius_, kFitTolerance));
     }
 
@@ -197,7 +199,8 @@ private:
 Cluster cluster_of(const Voxels& voxels, std::vector<uint32_t> cells, double min_radius) {
     Sketch sketch;
     for (const uint32_t cell : cells) sketch.add(voxels.points(cell));
-    return {enclosing_ellipsoid(sketch.points(), min_radius), std::move(cells)};
+    const Fit least = enclosing_ellipsoid(sketch.points(), min_radius);
+    return {capped(least.center, least.factor * least.factor.transpose(), min_radius), std::move(cells)};
 }
 
 } // namespace
@@ -312,6 +315,7 @@ std::vector<Cluster> spread_start(const Voxels& voxels, std::span<const uint32_t
     }
     std::vector<std::vector<uint32_t>> members(centers.size());
     for (int round = 0; round < kLloydRounds; ++round) {
+        checkpoint();
         for (std::vector<uint32_t>& list : members) list.clear();
         for (size_t i = 0; i < sites.size(); ++i) {
             size_t nearest = 0;

@@ -1,8 +1,8 @@
 #include "builder/triangle_tree.hpp"
 
-#include <Eigen/Geometry>
+#include "builder/job.hpp"
 
-#include <tbb/parallel_invoke.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -69,7 +69,7 @@ void TriangleTree::build(uint32_t index, uint32_t begin, uint32_t end) {
     const auto left = [=, this] { build(index + 1, begin, middle); };
     const auto right = [=, this] { build(nodes_[index].right, middle, end); };
     if (end - begin > kTaskTriangles) {
-        tbb::parallel_invoke(left, right);
+        parallel_invoke(left, right);
     } else {
         left();
         right();

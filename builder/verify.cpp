@@ -13,6 +13,8 @@
 //
 // Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners
 // of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
+// Where welding closed the mesh, the distance by which it moved points is added: whatever is within it of a point that
+// an ellipsoid holds by that margin, the ellipsoid holds.
 //
 // Shares no data with the bake: other boxes, other inside test (dipole tree instead of columns).
 //
@@ -21,19 +23,17 @@
 
 #include "builder/clip.hpp"
 #include "builder/fit.hpp"
+#include "builder/job.hpp"
 #include "builder/verify_bounding.hpp"
 #include "builder/verify_exact.hpp"
 #include "builder/winding.hpp"
 #include "src/hash.hpp"
 
 #include <tbb/concurrent_unordered_map.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 #include <optional>
 
@@ -109,8 +109,8 @@ private:
 
 class Prover {
 public:
-    Prover(const std::vector<Shape>& shapes, const ClosedSolid* solid, double size, std::atomic<bool>& stop)
-        : shapes_(shapes), solid_(solid), size_(size), stop_(stop) {}
+    Prover(const std::vector<Shape>& shapes, const ClosedSolid* solid, double size)
+        : shapes_(shapes), solid_(solid), size_(size) {}
 
     LevelProof proof; // covered stays true until something speaks against it
 
@@ -141,7 +141,8 @@ public:
     }
 
     void prove(Cell& cell) {
-        if (stop_.load(std::memory_order_relaxed) || settled(cell)) return;
+        checkpoint();
+        if (settled(cell)) return;
         if (cell.box.size().maxCoeff() < kSmallestBox * size_ || proof.pieces > kPiecesPerTask) {
             give_up(cell.box.center());
             return;
@@ -318,7 +319,6 @@ private:
     const std::vector<Shape>& shapes_;
     const ClosedSolid* solid_; // null in surface mode
     double size_;
-    std::atomic<bool>& stop_;
     uint32_t last_holder_ = 0;   // a shape
     std::optional<Vec> suspect_; // a point of the surface, in the cell at hand
 };
@@ -346,7 +346,7 @@ std::vector<Cell> cut_space(MeshView mesh, const Box& box) {
             {to_vec(mesh.vertices[t[0]]), to_vec(mesh.vertices[t[1]]), to_vec(mesh.vertices[t[2]])});
     for (int level = 0; level < kTaskLevels; ++level) {
         std::vector<Cell> parts(8 * cells.size());
-        tbb::parallel_for(size_t{0}, cells.size(), [&](size_t i) {
+        parallel_for(size_t{0}, cells.size(), [&](size_t i) {
             std::array<Cell, 8> cut = Prover::cut(cells[i]);
             std::move(cut.begin(), cut.end(), parts.begin() + static_cast<std::ptrdiff_t>(8 * i));
             cells[i] = {};
@@ -357,24 +357,20 @@ std::vector<Cell> cut_space(MeshView mesh, const Box& box) {
 }
 
 LevelProof prove_level(const std::vector<Shape>& shapes, const std::vector<Cell>& cells, const ClosedSolid* solid,
-                       double size, const std::function<bool(double)>& progress, std::atomic<bool>& stop) {
+                       double size, const std::function<void(double)>& progress) {
     std::vector<uint32_t> everyone(shapes.size());
     std::iota(everyone.begin(), everyone.end(), 0u);
     std::vector<LevelProof> proofs(cells.size());
     std::atomic<size_t> done = 0;
-    std::mutex reporting;
-    tbb::parallel_for(size_t{0}, cells.size(), [&](size_t i) {
-        Prover prover(shapes, solid, size, stop);
+    parallel_for(size_t{0}, cells.size(), [&](size_t i) {
+        Prover prover(shapes, solid, size);
         prover.proof.covered = true;
         Cell cell = cells[i];
         cell.candidates = everyone;
         prover.prove(cell);
         proofs[i] = prover.proof;
         const size_t finished = ++done;
-        if (progress && finished % 8 == 0) {
-            const std::lock_guard lock(reporting);
-            if (!progress(static_cast<double>(finished) / static_cast<double>(cells.size()))) stop = true;
-        }
+        if (finished % 8 == 0) progress(static_cast<double>(finished) / static_cast<double>(cells.size()));
     });
     LevelProof total;
     total.covered = true;
@@ -389,10 +385,8 @@ LevelProof prove_level(const std::vector<Shape>& shapes, const std::vector<Cell>
     return total;
 }
 
-} // namespace
-
-Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options) {
-    auto cleaned = clean(mesh);
+Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::function<void(double)>& progress) {
+    auto cleaned = clean(mesh, tree.bake_info().weld);
     if (!cleaned) return cleaned.error();
     const MeshView surface = cleaned->mesh.view();
 
@@ -405,16 +399,15 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
     Box box;
     for (const Vec3& v : surface.vertices) box.add(to_vec(v));
     const double size = box.size().norm();
-    const double rounding = kTolerance * std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff());
+    const double rounding = kTolerance * std::max(box.low.cwiseAbs().maxCoeff(), box.high.cwiseAbs().maxCoeff()) +
+                            cleaned->report.weld_distance;
     // Not the mesh's own box: halving that one would cut symmetric models in their planes of symmetry.
     box.low -= 0.0137 * Vec::Constant(size);
     box.high += 0.0171 * Vec::Constant(size);
     std::optional<ClosedSolid> solid;
     if (!report.surface_mode && !tree.bake_info().exact) solid.emplace(surface);
 
-    std::atomic<bool> stop = false;
-    tbb::task_arena arena(options.threads ? static_cast<int>(options.threads) : tbb::task_arena::automatic);
-    const std::vector<Cell> cells = arena.execute([&] { return cut_space(surface, box); });
+    const std::vector<Cell> cells = cut_space(surface, box);
     std::vector<Shape> all = shapes_of(tree, rounding);
     const std::optional<uint32_t> unbounded = find_unbounded(tree);
     report.bounded = !unbounded, report.unbounded_node = unbounded.value_or(0);
@@ -422,12 +415,8 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
         std::vector<Shape> shapes;
         tree.for_each_in_cut(l, [&](uint32_t node) { shapes.push_back(all[node]); });
-        const auto progress = [&](double fraction) { return options.progress((l + fraction) / tree.level_count()); };
-        std::function<bool(double)> level_progress;
-        if (options.progress) level_progress = progress;
-        const LevelProof proof = arena.execute(
-            [&] { return prove_level(shapes, cells, solid ? &*solid : nullptr, size, level_progress, stop); });
-        if (stop) return Error{ErrorCode::cancelled, "cancelled", 0};
+        const LevelProof proof = prove_level(shapes, cells, solid ? &*solid : nullptr, size,
+                                             [&](double part) { progress((l + part) / tree.level_count()); });
         report.covered = report.covered && proof.covered;
         report.levels.push_back(proof);
         if (l == 0 && proof.covered) // the root holds everything: no need to ask it again
@@ -435,6 +424,25 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
                 if (shape.parent == &all[0]) shape.parent = nullptr;
     }
     return report;
+}
+
+} // namespace
+
+Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options) {
+    std::atomic<double> done = 0;
+    std::function<bool()> go_on;
+    if (options.progress) go_on = [&] { return options.progress(done); };
+    Job job(options.threads, go_on);
+    try {
+        return job.run([&] {
+            return prove_all(tree, mesh, [&](double fraction) {
+                done = fraction;
+                job.ask();
+            });
+        });
+    } catch (const Cancelled&) {
+        return Error{ErrorCode::cancelled, "cancelled", 0};
+    }
 }
 
 } // namespace prolate

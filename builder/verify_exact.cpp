@@ -9,6 +9,7 @@
 
 #include "builder/fit.hpp"
 #include "builder/hulls.hpp"
+#include "builder/job.hpp"
 
 #include <tbb/parallel_sort.h>
 
@@ -27,7 +28,9 @@ using Corners = std::array<std::tuple<float, float, float>, 3>;
 
 template <class Position> std::vector<Corners> sorted_corners(uint32_t count, Position&& position) {
     std::vector<Corners> out(count);
+    Checkpoints checkpoints;
     for (uint32_t t = 0; t < count; ++t) {
+        checkpoints();
         for (size_t i = 0; i < 3; ++i) {
             const Vec3 p = position(t, i);
             out[t][i] = {p.x, p.y, p.z};
@@ -90,6 +93,7 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
             doubts[n].set(c.x, c.y, c.z);
     });
     tree.for_each_node([&](uint32_t leaf) {
+        checkpoint();
         const TriangleRange triangles = tree.triangles(leaf);
         for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
             for (const uint32_t corner : tree.triangle(t)) {

@@ -1,6 +1,7 @@
 #include "builder/voxels.hpp"
 
 #include "builder/clip.hpp"
+#include "builder/job.hpp"
 
 #include <Eigen/Geometry>
 
@@ -66,6 +67,7 @@ template <class Visit> void Voxels::clip_triangles(MeshView mesh, Visit&& visit)
         }
     };
     for (; triangle < mesh.triangles.size(); ++triangle) {
+        checkpoint();
         const Triangle& t = mesh.triangles[triangle];
         std::array<int, 3> at{};
         slice(slice, {to_vec(mesh.vertices[t[0]]), to_vec(mesh.vertices[t[1]]), to_vec(mesh.vertices[t[2]])}, 0, at);
@@ -126,7 +128,7 @@ void Voxels::collect_cells(MeshView mesh, bool closed, const Winding& winding) {
     point_begin_.push_back(0);
     triangle_begin_.push_back(0);
     for (int i = 0; i < size_[0]; ++i)
-        for (int j = 0; j < size_[1]; ++j)
+        for (int j = 0; j < size_[1]; ++j, checkpoint())
             for (int k = 0; k < size_[2]; ++k) {
                 const size_t v = index(i, j, k);
                 std::vector<Vec>& out = points_;

@@ -1,8 +1,8 @@
 #include "builder/winding.hpp"
 
-#include <Eigen/Geometry>
+#include "builder/job.hpp"
 
-#include <tbb/parallel_for.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,7 @@ double solid_angle(const Vec& corner_a, const Vec& corner_b, const Vec& corner_c
 }
 
 Winding::Winding(MeshView mesh) : tree_(mesh), moments_(tree_.nodes().size()) {
-    tbb::parallel_for(size_t{0}, moments_.size(), [&](size_t n) {
+    parallel_for(size_t{0}, moments_.size(), [&](size_t n) {
         const TriangleTree::Node& node = tree_.nodes()[n];
         const auto triangles = tree_.triangles().subspan(node.begin, node.end - node.begin);
         Moments& sum = moments_[n];

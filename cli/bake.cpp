@@ -3,6 +3,8 @@
 #include "cli/common.hpp"
 #include "cli/levels.hpp"
 #include "cli/manifest.hpp"
+#include "cli/outputs.hpp"
+#include "cli/threads.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -18,11 +20,14 @@ Give at most one of --levels, --ellipsoids, and --tolerance or --distance or bot
 than that volume and that distance.
 With --exact the tree goes down to the triangles and keeps them, a few in each leaf: its ellipsoids cover the surface
 only and cull, and queries answer as the triangles do. 100,000 triangles take about a second, whatever the quality.
-Coordinates and lengths are in the mesh's own unit. The same mesh and options give the same bytes.
+Coordinates are the file's own, taken as metres, unless --unit or --scale says more; a 3MF's unit is applied, a DAE's only
+told. The tree keeps scale and local origin, and answers of queries are relative to it. Vertices that nearly meet are joined
+if that closes the mesh (--weld 0: never), and the cover holds them where they stood. Closed parts that are inside out are
+turned. The same mesh and options give the same bytes.
 An open mesh has no certain inside: it is baked in surface mode, where the cover of its triangles is guaranteed.
 
-What is not done twice: if the output file already is what this mesh and these options make, it is left as it is
-("unchanged"). A folder given by --cache, or by the environment's PROLATE_CACHE, keeps every tree for the next time, for
+What is not done twice: if the output file already is what this mesh and these options make, only its date is
+renewed ("unchanged"). A folder given by --cache, or by the environment's PROLATE_CACHE, keeps every tree for the next time, for
 other outputs and for other machines ("cached"); with one, an unchanged mesh is not even imported. Both look at the
 mesh's content, the options and the builder's version, never at dates. Delete from the folder what you like.
 
@@ -47,6 +52,8 @@ Examples:
   prolate bake horse.obj -o horse.etree --ellipsoids 200 --quality best --report horse.json
   prolate bake horse.obj -o horse.etree --tolerance 0.1
   prolate bake horse.obj -o horse.etree --exact
+  prolate bake part.dae -o part.etree --unit mm
+  prolate bake site.obj -o site.etree --recentre
   prolate bake horse.obj -o - | ssh robot 'cat > horse.etree'
   prolate bake --manifest assets.json
   prolate bake --manifest assets.json --cache ~/.cache/prolate --json | jq '.assets[] | select(.error)')";
@@ -54,22 +61,27 @@ Examples:
 struct BakeArguments {
     Asset asset;
     std::string manifest, cache;
-    bool force = false, json = false;
+    Outputs outputs;
+    bool rebake = false, json = false;
     std::vector<const CLI::Option*> asset_options;
 };
 
-int run_one(const BakeArguments& a) {
+int run_one(BakeArguments& a) {
     if (a.asset.mesh.empty()) return complain(kUsage, "bake", "no mesh is given", "see 'prolate bake --help'");
     if (a.asset.output.empty()) return complain(kUsage, "bake", "--output is required", "see 'prolate bake --help'");
+    name_inputs(a.asset, a.outputs);
+    a.outputs.reads(a.cache, "the cache folder");
+    int code = claim_outputs(a.asset, a.outputs);
+    if (code != kDone) return code;
     BakeCache cache(a.cache);
-    int code = kDone;
-    const auto baked = bake_asset(a.asset, cache, a.force, "", code);
+    const auto baked = bake_asset(a.asset, a.outputs, cache, a.rebake, "", code);
     if (!baked) return code;
     if (baked->source == Source::unchanged)
-        note(a.asset.output, "unchanged: made from this mesh with these options (--force bakes anew)");
-    if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--force bakes anew)");
+        note(a.asset.output, "unchanged: made from this mesh with these options (--rebake bakes anew)");
+    if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--rebake bakes anew)");
     const std::string shown =
         a.json ? text_of(report_of(a.asset, *baked)) : level_table(baked->tree.view(), baked->level_seconds);
+    if (is_quiet() && !a.json) return kDone;
     if (is_standard_output(a.asset.output))
         fmt::print(stderr, "{}", shown);
     else
@@ -77,14 +89,16 @@ int run_one(const BakeArguments& a) {
     return kDone;
 }
 
-int run(const BakeArguments& a) {
+int run(BakeArguments& a) {
+    use_available_threads();
     if (a.manifest.empty()) return run_one(a);
     const std::string report = a.asset.report;
     for (const CLI::Option* option : a.asset_options)
         if (option->count() > 0)
             return complain(kUsage, option->get_name(), "does not go with --manifest", "say it in the manifest");
     BakeCache cache(a.cache);
-    return bake_manifest(a.manifest, cache, {a.force, a.json, a.asset.options.threads, report});
+    a.outputs.reads(a.cache, "the cache folder");
+    return bake_manifest(a.manifest, a.outputs, cache, {a.rebake, a.json, a.asset.options.threads, report});
 }
 
 } // namespace
@@ -98,7 +112,8 @@ void add_bake(CLI::App& app, Work& chosen) {
             a->asset_options.push_back(option);
     command->add_option("--manifest", a->manifest, "bake all assets of this JSON file; see below");
     command->add_option("--cache", a->cache, "folder that keeps baked trees; see below")->envname("PROLATE_CACHE");
-    command->add_flag("--force", a->force, "bake even if the result is already there");
+    command->add_flag("--rebake", a->rebake, "bake even if the result is already there");
+    a->outputs.declare(*command);
     command->add_flag("--json", a->json, "print the figures as JSON");
     command->footer(std::string(kFooter) + kLevelTableHelp + kExamples);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

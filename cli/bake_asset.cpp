@@ -2,6 +2,7 @@
 
 #include "cli/common.hpp"
 #include "cli/levels.hpp"
+#include "cli/progress_line.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -10,39 +11,13 @@
 #include <filesystem>
 #include <utility>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+
 namespace prolate::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-// What the user should know of the mesh, one line each.
-void diagnose(const std::string& mesh, const MeshReport& report) {
-    // Some readers give each triangle corners of its own, so the number merged says little of the file.
-    const uint32_t distinct = report.input_vertices - report.merged_vertices - report.unused_vertices;
-    note(mesh, fmt::format("{} triangles on {} distinct vertices ({} as read)", grouped(report.input_triangles),
-                           grouped(distinct), grouped(report.input_vertices)));
-    if (report.degenerate_triangles > 0)
-        note(mesh, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
-    if (report.non_manifold_edges > 0)
-        note(mesh, fmt::format("{} edges belong to three or more triangles", grouped(report.non_manifold_edges)));
-    if (!report.closed)
-        note(mesh, fmt::format("{} open edges: no inside can be promised, baked in surface mode",
-                               grouped(report.open_edges)));
-}
-
-// A bake can take long: knows first that there is a place for its result, and that it is not the input.
-int check_files(const Asset& a) {
-    std::error_code none;
-    for (const std::string& output : {a.output, a.report})
-        if (!output.empty() && fs::equivalent(output, a.mesh, none))
-            return complain(kUsage, output, "is the input itself", "name another output");
-    if (!a.report.empty() && a.report == a.output)
-        return complain(kUsage, a.report, "is named for the tree and for the report", "name two files");
-    for (const std::string& output : {a.output, a.report})
-        if (!output.empty())
-            if (const int code = check_output(output); code != kDone) return code;
-    return kDone;
-}
 
 // The tree in the output file, if there is one to be looked at.
 std::optional<Tree> old_output(const Asset& a) {
@@ -61,30 +36,31 @@ std::optional<Baked> reuse(std::optional<Tree>& old, const BakeCache& cache, uin
 }
 
 // Reuses or bakes; writes nothing but cache entries.
-std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const std::string& label, int& code) {
+std::optional<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::string& label, int& code) {
     const auto options = options_of(a, code);
     if (!options) return {};
-    if (code = check_files(a); code != kDone) return {};
+    const auto import = import_options(a.mesh_options, code);
+    if (!import) return {};
     const uint64_t key = hash(*options);
-    std::optional<Tree> old = force ? std::nullopt : old_output(a);
+    std::optional<Tree> old = rebake ? std::nullopt : old_output(a);
 
     // The file's bytes say which mesh it is, if they have been seen before.
     std::optional<uint64_t> file;
-    if (cache) file = hash_mesh_file(a.mesh.c_str());
-    if (file && !force)
+    if (cache) file = hash_mesh_file(a.mesh.c_str(), *import);
+    if (file && !rebake)
         if (const auto seen = cache.find_source(*file))
             if (auto baked = reuse(old, cache, *seen, key)) return baked;
 
-    const auto mesh = read_mesh(a.mesh, code);
+    const auto mesh = read_mesh(a.mesh, code, *import);
     if (!mesh) return {};
     // The mesh itself says it, if there is anything to compare it with.
     if ((old && old->view().bake_info().options_hash == key) || cache) {
-        const auto cleaned = clean(mesh->view());
+        const auto cleaned = clean(mesh->view(), options->weld);
         if (!cleaned) return code = complain(a.mesh, cleaned.error()), std::nullopt;
         const uint64_t source = hash(cleaned->mesh.view());
         // Remembered only if the file was the same before and after it was read.
-        if (file && *file == hash_mesh_file(a.mesh.c_str())) cache.keep_source(*file, source);
-        if (!force)
+        if (file && *file == hash_mesh_file(a.mesh.c_str(), *import)) cache.keep_source(*file, source);
+        if (!rebake)
             if (auto baked = reuse(old, cache, source, key)) {
                 baked->diagnosis = cleaned->report;
                 return baked;
@@ -97,7 +73,7 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const st
     }();
     if (built && interrupted()) built = Error{ErrorCode::cancelled};
     if (!built) return code = complain(a.mesh, built.error()), std::nullopt;
-    diagnose(a.mesh, built->mesh);
+    describe_mesh(a.mesh, built->mesh);
     Baked baked{Source::baked, std::move(built->tree), built->mesh, {}};
     for (const LevelReport& level : built->levels) baked.level_seconds.push_back(level.seconds);
     return baked;
@@ -106,8 +82,11 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool force, const st
 } // namespace
 
 void declare_asset_options(CLI::App& app, Asset& a) {
-    app.add_option("mesh", a.mesh, "the mesh: OBJ, PLY, STL, OFF, glTF, GLB, 3DS or DAE");
+    app.add_option("mesh", a.mesh, "the mesh: OBJ, PLY, STL, OFF, glTF, GLB, 3MF, 3DS or DAE; - for standard input");
     app.add_option("-o,--output", a.output, "the .etree file to write, or - for standard output");
+    declare_mesh_options(app, a.mesh_options);
+    app.add_option("--weld", a.mesh_options.weld,
+                   "join vertices of open edges within this length, if that closes the mesh (default: 8 float steps)");
     app.add_option("--degree", a.options.degree, "children of a node, 2 ... 64")->capture_default_str();
     app.add_option("--levels", a.levels, "levels below the root, 1 ... 31");
     app.add_option("--ellipsoids", a.ellipsoids, "number of leaves, 1 ... 65536: the best set of so many");
@@ -122,7 +101,7 @@ void declare_asset_options(CLI::App& app, Asset& a) {
     app.add_flag("--exact", a.options.exact, "keep the triangles, in the leaves: queries answer as they do");
     app.add_option("--leaf-triangles", a.options.leaf_triangles, "most triangles in a leaf, 1 ... 127; with --exact")
         ->capture_default_str();
-    app.add_option("--threads", a.options.threads, "0 = all cores; the result does not depend on it")
+    app.add_option("-j,--threads", a.options.threads, "0 = all cores; the result does not depend on it")
         ->capture_default_str();
     app.add_option("--seed", a.options.seed, "of all that is drawn at random")->capture_default_str();
     app.add_option("--report", a.report, "also write all figures to this JSON file");
@@ -165,6 +144,9 @@ std::optional<BuildOptions> options_of(const Asset& a, int& code) {
     if (a.ellipsoids == 0u) return refuse("--ellipsoids", "must be 1 to 65536", "see 'prolate bake --help'");
     if (a.tolerance == 0.0f) return refuse("--tolerance", "must be above 0", "see 'prolate bake --help'");
     if (a.distance == 0.0f) return refuse("--distance", "must be above 0", "see 'prolate bake --help'");
+    if (a.mesh_options.weld && !(*a.mesh_options.weld >= 0))
+        return refuse("--weld", "must be a length, or 0", "see 'prolate bake --help'");
+    options.weld = a.mesh_options.weld.value_or(kDefaultWeld);
     options.levels = a.levels.value_or(0);
     options.ellipsoids = a.ellipsoids.value_or(0);
     options.tolerance = a.tolerance.value_or(0);
@@ -176,19 +158,34 @@ std::optional<BuildOptions> options_of(const Asset& a, int& code) {
     return options;
 }
 
-std::optional<Baked> bake_asset(const Asset& a, BakeCache& cache, bool force, const std::string& label, int& code) {
+void name_inputs(const Asset& a, Outputs& outputs, const std::string& whose) {
+    outputs.reads(a.mesh, "the mesh" + whose);
+}
+
+int claim_outputs(const Asset& a, Outputs& outputs, const std::string& whose) {
+    const int code = outputs.claim(a.output, "the output" + whose, "etree");
+    return code == kDone ? outputs.claim(a.report, "the report" + whose, "json") : code;
+}
+
+std::optional<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cache, bool rebake,
+                                const std::string& label, int& code) {
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
-    auto baked = make(a, cache, force, label, code);
+    auto baked = make(a, cache, rebake, label, code);
     if (!baked) return {};
     if (!baked->tree.view().bake_info().goal_reached)
         note(a.mesh, "the asked number, tolerance or distance was not reached at this resolution; try --quality best");
-    if (baked->source != Source::unchanged)
-        if (code = write_output(a.output, baked->tree.bytes()); code != kDone) return {};
     cache.keep(baked->tree.view(), baked->source == Source::baked);
+    if (baked->source == Source::unchanged) {
+        // For make and its like, which go by dates. Whose file it is not may not do so, and loses nothing but that.
+        ::utimensat(AT_FDCWD, a.output.c_str(), nullptr, 0);
+    } else {
+        code = outputs.write(a.output, baked->tree.bytes(), cache ? Outputs::Effort::small : Outputs::Effort::long_);
+        if (code != kDone && cache) note(a.output, "the cache has the tree: the next run takes it from there");
+        if (code != kDone) return {};
+    }
     baked->seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    if (!a.report.empty())
-        if (code = write_output(a.report, text_of(report_of(a, *baked))); code != kDone) return {};
+    if (code = outputs.write(a.report, text_of(report_of(a, *baked))); code != kDone) return {};
     return baked;
 }
 
@@ -203,6 +200,10 @@ nlohmann::ordered_json report_of(const Asset& a, const Baked& baked) {
                             {"input_triangles", m.input_triangles},
                             {"merged_vertices", m.merged_vertices},
                             {"unused_vertices", m.unused_vertices},
+                            {"welded_vertices", m.welded_vertices},
+                            {"weld_distance", m.weld_distance},
+                            {"turned_shells", m.turned_shells},
+                            {"size", m.size},
                             {"degenerate_triangles", m.degenerate_triangles},
                             {"open_edges", m.open_edges},
                             {"non_manifold_edges", m.non_manifold_edges},

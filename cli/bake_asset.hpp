@@ -3,6 +3,8 @@
 #pragma once
 
 #include "cli/cache.hpp"
+#include "cli/mesh_options.hpp"
+#include "cli/outputs.hpp"
 
 #include <prolate/build.hpp>
 
@@ -24,6 +26,7 @@ struct Asset {
     std::string method = "voxel", primitive = "ellipsoid", quality = "normal";
     std::optional<uint32_t> levels, ellipsoids;
     std::optional<float> tolerance, distance;
+    MeshOptions mesh_options;
     BuildOptions options;
 };
 
@@ -50,10 +53,16 @@ struct Baked {
 /// The asset's options as the library takes them; or a complaint, and `code`.
 std::optional<BuildOptions> options_of(const Asset& asset, int& code);
 
-/// Makes sure that the output is what the mesh and the options make, at the least cost (`force`: by baking), and writes
-/// the report. Complains and sets `code` if it cannot; then the output is what it was before. `label` is for the
-/// progress line.
-std::optional<Baked> bake_asset(const Asset& asset, BakeCache& cache, bool force, const std::string& label, int& code);
+/// Names the asset's inputs, or claims its outputs: all inputs of a run come before all outputs. `whose` is "", or
+/// " of asset 2".
+void name_inputs(const Asset& asset, Outputs& outputs, const std::string& whose = "");
+int claim_outputs(const Asset& asset, Outputs& outputs, const std::string& whose = "");
+
+/// Makes sure that the output is what the mesh and the options make, at the least cost (`rebake`: by baking), with a
+/// new date, and writes the report. Complains and sets `code` if it cannot; then the output is what it was before.
+/// `label` is for the progress line.
+std::optional<Baked> bake_asset(const Asset& asset, const Outputs& outputs, BakeCache& cache, bool rebake,
+                                const std::string& label, int& code);
 
 /// All figures, as --report and --json have them.
 nlohmann::ordered_json report_of(const Asset& asset, const Baked& baked);

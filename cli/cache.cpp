@@ -6,8 +6,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <utility>
 
 namespace prolate::cli {
@@ -49,11 +47,10 @@ std::optional<Tree> BakeCache::find(uint64_t source, uint64_t options) const {
 
 std::optional<uint64_t> BakeCache::find_source(uint64_t file) const {
     if (folder_.empty()) return {};
-    std::ifstream entry(path(source_name(file)), std::ios::binary);
-    const std::string text(std::istreambuf_iterator<char>(entry), {});
-    if (text.size() != source_text(file, 0).size()) return {};
-    const uint64_t source = std::strtoull(text.c_str() + 17, nullptr, 16);
-    if (text != source_text(file, source)) return {};
+    const auto text = read_file(path(source_name(file)));
+    if (!text || text->size() != source_text(file, 0).size()) return {};
+    const uint64_t source = std::strtoull(text->c_str() + 17, nullptr, 16);
+    if (*text != source_text(file, source)) return {};
     return source;
 }
 
@@ -61,8 +58,13 @@ void BakeCache::write(const std::string& name, std::span<const std::byte> bytes)
     if (folder_.empty()) return;
     std::error_code error;
     fs::create_directories(folder_, error);
+    const std::string entry = path(name);
+    std::error_code none;
+    if (fs::is_directory(entry, none)) return note(entry, "a folder where the cache wants a file: not kept");
+    // A link would lead out of the folder, to a file that is not the cache's.
+    if (fs::is_symlink(fs::symlink_status(entry, none))) fs::remove(entry, none);
     Result<void> saved = error ? Error{ErrorCode::io, "cannot be made", static_cast<uint64_t>(error.value())}
-                               : save(path(name).c_str(), bytes);
+                               : save(entry.c_str(), bytes);
     if (saved) return;
     note(std::exchange(folder_, ""), fmt::format("the cache folder is left out: {}", words_of(saved.error())));
 }
@@ -71,7 +73,7 @@ void BakeCache::keep(const TreeView& tree, bool replace) {
     const BakeInfo info = tree.bake_info();
     const std::string name = tree_name(info.source_hash, info.options_hash);
     std::error_code none;
-    if (replace || !fs::exists(path(name), none)) write(name, tree.bytes());
+    if (replace || !fs::is_regular_file(path(name), none)) write(name, tree.bytes());
 }
 
 void BakeCache::keep_source(uint64_t file, uint64_t source) {

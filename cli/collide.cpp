@@ -3,11 +3,15 @@
 #include "cli/pose.hpp"
 
 #include <prolate/collide.hpp>
+#include <prolate/distance.hpp>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <memory>
 
 namespace prolate::cli {
@@ -17,20 +21,53 @@ constexpr const char* kFooter = R"(
 The pose is that of B in the frame of A: translation tx,ty,tz, then optionally the rotation as a quaternion
 qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapping" speaks of the covers: the solids
 may still be apart by what the covers stick out. Of exact trees, it speaks of their triangles, or of a body inside the
-other. The exit code is 0 whatever the verdict.
+other. The distance is that of the bodies of which the verdict speaks, with certain bounds; the points are the nearest
+ones found, in the frame of A. Nodes are named by their slots in the file, as "export" has them.
+
+The exit code is 0 whatever the verdict; with --exit-code 0 means separated, 1 overlapping, 6 undecided (--budget).
 
 Examples:
   prolate collide horse.etree bunny.etree --pose 0.5,0,0
-  prolate collide horse.etree bunny.etree --pose 0.5,0,0,0,0,0.7071,0.7071 --json)";
+  prolate collide horse.etree bunny.etree --pose 0.5,0,0,0,0,0.7071,0.7071 --json
+  prolate collide arm.etree table.etree --pose 0,0,0.8 --exit-code && echo free)";
 
 struct CollideArguments {
     std::string tree_a, tree_b, pose = "0,0,0";
     std::optional<uint32_t> level;
     std::optional<uint64_t> budget;
-    bool json = false;
+    bool json = false, exit_code = false;
 };
 
-constexpr const char* kVerdicts[] = {"separated", "overlapping", "undecided"};
+constexpr const char* kVerdicts[] = {"separated", "overlapping", "undecided"}; // by Verdict
+constexpr int kVerdictCodes[] = {kDone, kNo, kUnknown};
+
+uint32_t level_of(const TreeView& tree, uint32_t node) {
+    uint32_t level = 0;
+    while (level + 1 < tree.level_count() && tree.level(level + 1).first_slot <= node) ++level;
+    return level;
+}
+
+nlohmann::ordered_json distance_json(const DistanceResult& distance) {
+    nlohmann::ordered_json out{
+        {"lower", distance.lower}, {"upper", nullptr}, {"point_a", nullptr}, {"point_b", nullptr}};
+    if (!std::isfinite(distance.upper)) return out;
+    out["upper"] = distance.upper;
+    if (distance.verdict == Verdict::overlapping) return out;
+    out["point_a"] = std::array<double, 3>{distance.point_a.x, distance.point_a.y, distance.point_a.z};
+    out["point_b"] = std::array<double, 3>{distance.point_b.x, distance.point_b.y, distance.point_b.z};
+    return out;
+}
+
+std::string distance_text(const DistanceResult& distance) {
+    if (distance.verdict == Verdict::overlapping) return "distance 0\n";
+    if (!std::isfinite(distance.upper)) return fmt::format("distance at least {:.6g}\n", distance.lower);
+    const auto point = [](const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z); };
+    const bool close = distance.upper - distance.lower <= 1e-5 * distance.upper;
+    return fmt::format("distance {}, from {} of A to {} of B\n",
+                       close ? fmt::format("{:.6g}", distance.upper)
+                             : fmt::format("{:.6g} to {:.6g}", distance.lower, distance.upper),
+                       point(distance.point_a), point(distance.point_b));
+}
 
 int run(const CollideArguments& a) {
     const auto pose = parse_pose(a.pose);
@@ -40,6 +77,10 @@ int run(const CollideArguments& a) {
     if (!tree_a) return code;
     const auto tree_b = read_tree(a.tree_b, code);
     if (!tree_b) return code;
+    if (const uint32_t levels = std::max(tree_a->view().level_count(), tree_b->view().level_count());
+        a.level && *a.level >= levels)
+        return complain(kUsage, "--level", fmt::format("neither tree has a level {}", *a.level),
+                        fmt::format("their levels are 0 to {}", levels - 1));
     QueryOptions options;
     options.max_level = a.level.value_or(options.max_level);
     options.max_pair_tests = a.budget.value_or(options.max_pair_tests);
@@ -47,6 +88,11 @@ int run(const CollideArguments& a) {
     const CollideResult result = collide(tree_a->view(), Pose{}, tree_b->view(), *pose, context, options);
     const char* verdict = kVerdicts[static_cast<size_t>(result.verdict)];
     const bool meet = result.verdict == Verdict::overlapping;
+    DistanceOptions distance_options;
+    distance_options.max_level = options.max_level;
+    distance_options.max_pair_tests = options.max_pair_tests;
+    const DistanceResult apart = distance(tree_a->view(), Pose{}, tree_b->view(), *pose, context, distance_options);
+    const int code_of_verdict = a.exit_code ? kVerdictCodes[static_cast<size_t>(result.verdict)] : kDone;
     if (a.json) {
         nlohmann::ordered_json out;
         out["verdict"] = verdict;
@@ -55,26 +101,30 @@ int run(const CollideArguments& a) {
         const auto triangle = [](uint32_t t) { return t == kNoTriangle ? nullptr : nlohmann::ordered_json(t); };
         out["triangle_a"] = triangle(result.pair.triangle_a);
         out["triangle_b"] = triangle(result.pair.triangle_b);
+        out["distance"] = distance_json(apart);
         out["enclosed"] = result.enclosed;
         out["pair_tests"] = result.stats.pair_tests;
         out["block_tests"] = result.stats.block_tests;
         out["triangle_tests"] = result.stats.triangle_tests;
         out["deepest_level"] = result.stats.deepest_level;
         print(out.dump(2) + '\n');
-        return kDone;
+        return code_of_verdict;
     }
-    const auto part = [](uint32_t node, uint32_t triangle) {
-        return triangle == kNoTriangle ? fmt::format("node {}", node) : fmt::format("triangle {}", triangle);
+    const auto part = [](const Tree& tree, uint32_t node, uint32_t triangle, char body) {
+        return triangle == kNoTriangle
+                   ? fmt::format("node {} of {} (level {})", node, body, level_of(tree.view(), node))
+                   : fmt::format("triangle {} of {}", triangle, body);
     };
-    print(!meet ? fmt::format("{}\n", verdict)
-          : result.enclosed
-              ? fmt::format("{}: a part of one lies inside the other\n", verdict)
-              : fmt::format("{}: {} of A and {} of B meet\n", verdict, part(result.pair.node_a, result.pair.triangle_a),
-                            part(result.pair.node_b, result.pair.triangle_b)));
+    print(!meet             ? fmt::format("{}\n", verdict)
+          : result.enclosed ? fmt::format("{}: a part of one lies inside the other\n", verdict)
+                            : fmt::format("{}: {} and {} meet\n", verdict,
+                                          part(*tree_a, result.pair.node_a, result.pair.triangle_a, 'A'),
+                                          part(*tree_b, result.pair.node_b, result.pair.triangle_b, 'B')));
+    print(distance_text(apart));
     print(fmt::format("{} pair tests, {} block tests, {} triangle tests, deepest level {}\n",
                       grouped(result.stats.pair_tests), grouped(result.stats.block_tests),
                       grouped(result.stats.triangle_tests), result.stats.deepest_level));
-    return kDone;
+    return code_of_verdict;
 }
 
 } // namespace
@@ -82,11 +132,12 @@ int run(const CollideArguments& a) {
 void add_collide(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<CollideArguments>();
     CLI::App* command = app.add_subcommand("collide", "Ask whether two trees meet");
-    command->add_option("a", a->tree_a, "the .etree file of body A")->required();
-    command->add_option("b", a->tree_b, "the .etree file of body B")->required();
+    command->add_option("a", a->tree_a, "the .etree file of body A, or - for standard input")->required();
+    command->add_option("b", a->tree_b, "the .etree file of body B, or - for standard input")->required();
     command->add_option("--pose", a->pose, "of B in the frame of A: tx,ty,tz[,qx,qy,qz,qw]")->capture_default_str();
     command->add_option("--level", a->level, "look no deeper than this level (default: all)");
     command->add_option("--budget", a->budget, "stop undecided after so many pair tests (default: never)");
+    command->add_flag("--exit-code", a->exit_code, "tell the verdict by the exit code, too; see below");
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

@@ -1,26 +1,33 @@
 #include "cli/common.hpp"
 
+#include "cli/signals.hpp"
+
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
-#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <new>
 #include <numeric>
+#include <stdexcept>
 #include <utility>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 namespace prolate::cli {
 namespace {
 
-std::atomic<bool> interrupted_flag{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may touch only lock-free atomics");
 int output_errno = 0; // of the first failed write to standard output
-std::string part_of_work, last_complaint;
+bool printed = false, output_taken = false, quiet = false, json_errors = false;
+std::string part_of_work;
+struct Complaint {
+    int code = kDone;
+    std::string subject, what, advice;
+} last_complaint;
 
 int exit_code(ErrorCode code) {
     switch (code) {
@@ -32,16 +39,18 @@ int exit_code(ErrorCode code) {
     case ErrorCode::newer_version:
         return kBadInput;
     case ErrorCode::io:
+    case ErrorCode::out_of_memory:
         return kIo;
     case ErrorCode::cancelled:
         return kInterrupted;
     case ErrorCode::internal:
-    case ErrorCode::out_of_memory:
     case ErrorCode::bad_id:
         break;
     }
     return kInternal;
 }
+
+constexpr const char* kMemoryAdvice = "take a smaller mesh, fewer levels or ellipsoids, or a lower --quality";
 
 std::string_view advice_for_errno(int number) {
     switch (number) {
@@ -50,6 +59,10 @@ std::string_view advice_for_errno(int number) {
     case ENOTDIR:
     case EISDIR:
         return "name a file";
+    case ENAMETOOLONG:
+        return "take a shorter name";
+    case EAGAIN:
+        return "raise the limit of processes (ulimit -u)";
     case EACCES:
     case EPERM:
     case EROFS:
@@ -78,10 +91,11 @@ std::string_view advice_for(const Error& error) {
         return advice_for_errno(static_cast<int>(error.where));
     case ErrorCode::internal:
         return "please report this, with the input";
+    case ErrorCode::out_of_memory:
+        return kMemoryAdvice;
     case ErrorCode::unsupported: // says itself what to use
     case ErrorCode::cancelled:
-    case ErrorCode::out_of_memory: // these two come from worlds, which the command has none of
-    case ErrorCode::bad_id:
+    case ErrorCode::bad_id: // comes from worlds, which the command has none of
         break;
     }
     return "";
@@ -90,9 +104,7 @@ std::string_view advice_for(const Error& error) {
 void print_line(std::string_view subject, std::string_view what, std::string_view advice) {
     std::string line = fmt::format("prolate: {}{}: {}", part_of_work, subject, what);
     if (!advice.empty()) line += fmt::format("; {}", advice);
-    for (char& c : line) // a file name or a reader's words may hold anything; this stays one line
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-    line += '\n';
+    line = visible(line) + '\n'; // a file name or a reader's words may hold anything
     std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -100,17 +112,100 @@ int complain_with_advice(std::string_view subject, const Error& error, std::stri
                          std::string_view advice) {
     if (error.code == ErrorCode::cancelled)
         return complain(kInterrupted, subject, "interrupted", "nothing was written");
-    return complain(exit_code(error.code), subject, words_of(error, detail), advice);
+    // An error that brings its own advice says it behind a "; ".
+    const std::string_view what = error.what;
+    const size_t own = what.find("; ");
+    if (own == what.npos) return complain(exit_code(error.code), subject, words_of(error, detail), advice);
+    const std::string before(what.substr(0, own));
+    return complain(exit_code(error.code), subject, words_of({error.code, before.c_str(), error.where}, detail),
+                    what.substr(own + 2));
 }
 
-extern "C" void on_signal(int) {
-    interrupted_flag.store(true);
+// Bytes of the UTF-8 character that `text` begins with, and the character; 0 bytes if it is none.
+std::pair<size_t, char32_t> decode(std::string_view text) {
+    const auto byte = [text](size_t i) { return static_cast<unsigned char>(text[i]); };
+    const size_t length = byte(0) < 0x80   ? 1
+                          : byte(0) < 0xc2 ? 0
+                          : byte(0) < 0xe0 ? 2
+                          : byte(0) < 0xf0 ? 3
+                          : byte(0) < 0xf5 ? 4
+                                           : 0;
+    if (length == 0 || length > text.size()) return {0, 0};
+    char32_t c = length == 1 ? byte(0) : byte(0) & (0x7fu >> length);
+    for (size_t i = 1; i < length; ++i) {
+        if ((byte(i) & 0xc0) != 0x80) return {0, 0};
+        c = c << 6 | (byte(i) & 0x3fu);
+    }
+    return {length, c};
+}
+
+// The kind of mesh, as an extension, that begins so.
+std::string mesh_kind_of(std::string_view bytes) {
+    const auto begins = [bytes](std::string_view with) { return bytes.starts_with(with); };
+    const std::string_view head = bytes.substr(0, 4096);
+    const auto holds = [head](std::string_view what) { return head.find(what) != head.npos; };
+    uint32_t stl_triangles = 0;
+    if (bytes.size() >= 84) std::memcpy(&stl_triangles, bytes.data() + 80, sizeof stl_triangles);
+    if (bytes.size() >= 84 && bytes.size() == 84 + uint64_t{50} * stl_triangles) return "stl";
+    if (begins("ply")) return "ply";
+    if (begins("glTF")) return "glb";
+    if (begins("PK\x03\x04")) return "3mf";
+    if (begins("MM")) return "3ds";
+    if (begins("solid") && holds("facet")) return "stl";
+    if (holds("<COLLADA")) return "dae";
+    if (head.substr(std::min(head.find_first_not_of(" \t\r\n"), head.size())).starts_with('{')) return "gltf";
+    for (const char* off : {"OFF", "COFF", "NOFF", "STOFF"})
+        if (begins(off)) return "off";
+    return "obj";
+}
+
+// A mesh from standard input. The importer wants a name, by whose ending it knows the format.
+Result<Mesh> load_standard_input(const ImportOptions& options, ImportReport& report) {
+    const GracefulStop removes_its_file;
+    const auto bytes = read_file("-");
+    if (!bytes) return bytes.error();
+    std::error_code error;
+    const std::string kind = mesh_kind_of(*bytes);
+    std::string name = (std::filesystem::temp_directory_path(error) / "prolate-XXXXXX.").string() + kind;
+    const int file = error ? -1 : ::mkstemps(name.data(), static_cast<int>(kind.size()) + 1);
+    if (file < 0)
+        return Error{ErrorCode::io, "cannot be kept in the folder for temporary files", static_cast<uint64_t>(errno)};
+    ::close(file);
+    const auto written = save(name.c_str(), std::as_bytes(std::span(*bytes)));
+    auto mesh = written ? load_mesh(name.c_str(), options, &report) : Result<Mesh>(written.error());
+    ::unlink(name.c_str());
+    return mesh;
+}
+
+// Standard input can be read once.
+bool take_standard_input(int& code) {
+    static bool taken = false;
+    if (std::exchange(taken, true))
+        code = complain(kUsage, "-", "standard input can be only one of the inputs", "name a file");
+    return code == kDone;
 }
 
 } // namespace
 
+std::string visible(std::string_view text) {
+    std::string out;
+    while (!text.empty()) {
+        const auto [length, c] = decode(text);
+        const bool control = c < 0x20 || (c >= 0x7f && c < 0xa0);
+        const bool turns = (c >= 0x200e && c <= 0x200f) || (c >= 0x2028 && c <= 0x202e) || (c >= 0x2066 && c <= 0x2069);
+        const size_t bytes = std::max<size_t>(length, 1);
+        if (length == 0 || control || turns)
+            for (const char byte : text.substr(0, bytes))
+                out += fmt::format("\\x{:02x}", static_cast<unsigned char>(byte));
+        else
+            out += text.substr(0, bytes);
+        text.remove_prefix(bytes);
+    }
+    return out;
+}
+
 int complain(int code, std::string_view subject, std::string_view what, std::string_view advice) {
-    last_complaint = fmt::format("{}: {}", subject, what);
+    last_complaint = {code, std::string(subject), std::string(what), std::string(advice)};
     print_line(subject, what, advice);
     return code;
 }
@@ -133,120 +228,134 @@ int complain(std::string_view subject, const Error& error, std::string_view deta
     return complain_with_advice(subject, error, detail, advice_for(error));
 }
 
+int guarded(const Work& work) {
+    try {
+        return work();
+    } catch (const std::bad_alloc&) {
+        return complain(kIo, "memory", "there is not enough of it", kMemoryAdvice);
+    } catch (const std::length_error&) { // a container that would be larger than any memory
+        return complain(kIo, "memory", "there is not enough of it", kMemoryAdvice);
+    } catch (const std::exception& e) {
+        // oneTBB's words when the system gives no thread; its exception says nothing else.
+        if (std::string_view(e.what()).starts_with("pthread_"))
+            return complain(kIo, "threads", e.what(), advice_for_errno(EAGAIN));
+        return complain(kInternal, "internal error", e.what(), "please report this, with the input");
+    }
+}
+
+void be_quiet() {
+    quiet = true;
+}
+bool is_quiet() {
+    return quiet;
+}
+
 void note(std::string_view subject, std::string_view text) {
-    print_line(subject, text, "");
+    if (!quiet) print_line(subject, text, "");
 }
 
 PartOfWork::PartOfWork(std::string part) {
     part_of_work = std::move(part) + ": ";
-    last_complaint.clear();
+    last_complaint = {};
 }
 PartOfWork::~PartOfWork() {
     part_of_work.clear();
 }
-const std::string& PartOfWork::complaint() const {
-    return last_complaint;
+std::string PartOfWork::complaint() const {
+    return last_complaint.code == kDone ? "" : last_complaint.subject + ": " + last_complaint.what;
 }
 
-std::optional<Mesh> read_mesh(const std::string& path, int& code) {
-    std::string detail;
-    auto mesh = load_mesh(path.c_str(), &detail);
-    if (mesh) return std::move(*mesh);
-    code = complain_with_advice(path, mesh.error(), detail,
+bool is_standard_input(const std::string& path) {
+    return path == "-" || path == "/dev/stdin";
+}
+
+Result<std::string> read_file(const std::string& path, size_t most) {
+    const auto fail = [] { return Error{ErrorCode::io, "cannot be read", static_cast<uint64_t>(errno)}; };
+    const int file = is_standard_input(path) ? ::dup(STDIN_FILENO) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (file < 0) return fail();
+    std::string out;
+    char buffer[1 << 16];
+    while (out.size() < most) {
+        const ssize_t n = ::read(file, buffer, std::min(sizeof buffer, most - out.size()));
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) {
+            const Error error = fail();
+            ::close(file);
+            return error;
+        }
+        if (n == 0) break;
+        out.append(buffer, static_cast<size_t>(n));
+    }
+    ::close(file);
+    return out;
+}
+
+std::optional<Mesh> read_mesh(const std::string& path, int& code, const ImportOptions& options) {
+    ImportReport report;
+    const bool piped = is_standard_input(path);
+    if (piped && !take_standard_input(code)) return {};
+    auto mesh = piped ? load_standard_input(options, report) : load_mesh(path.c_str(), options, &report);
+    if (mesh) {
+        for (const std::string& line : report.notes) note(path, line);
+        return std::move(*mesh);
+    }
+    code = complain_with_advice(piped ? "standard input" : path, mesh.error(), report.detail,
                                 mesh.error().code == ErrorCode::bad_file
-                                    ? "export the mesh again, as OBJ, PLY, STL, OFF, glTF, GLB, 3DS or DAE"
+                                    ? "export the mesh again, as OBJ, PLY, STL, OFF, glTF, GLB, 3MF, 3DS or DAE"
                                     : advice_for(mesh.error()));
     return {};
 }
 
 std::optional<Tree> read_tree(const std::string& path, int& code) {
-    auto tree = load(path.c_str());
+    const bool piped = is_standard_input(path);
+    if (piped && !take_standard_input(code)) return {};
+    auto tree = load(piped ? "/dev/stdin" : path.c_str());
     if (tree) return std::move(*tree);
-    code = complain_with_advice(path, tree.error(), "",
+    code = complain_with_advice(piped ? "standard input" : path, tree.error(), "",
                                 tree.error().code == ErrorCode::bad_file ? "make it again with 'prolate bake'"
                                                                          : advice_for(tree.error()));
     return {};
 }
 
-bool is_standard_output(const std::string& path) {
-    return path == "-" || path == "/dev/stdout";
-}
-
-int check_output(const std::string& path) {
-    namespace fs = std::filesystem;
-    if (is_standard_output(path)) return kDone;
-    std::error_code ignored;
-    if (fs::is_directory(path, ignored)) return complain(path, Error{ErrorCode::io, "cannot write there", EISDIR});
-    if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) return kDone; // a pipe or device
-    const fs::path parent = fs::path(path).parent_path();
-    const std::string folder = parent.empty() ? "." : parent.string();
-    if (!fs::is_directory(folder, ignored))
-        return complain(kIo, path, fmt::format("the folder {} does not exist", folder), "create it first");
-    if (::access(folder.c_str(), W_OK) != 0)
-        return complain(path, Error{ErrorCode::io, "cannot write into its folder", static_cast<uint64_t>(errno)});
-    return kDone;
-}
-
-int write_output(const std::string& path, std::span<const std::byte> bytes) {
-    if (is_standard_output(path)) {
-        print({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-        return kDone;
-    }
-    // save() replaces the name; a link should go on pointing at what it points at.
-    std::error_code error;
-    const std::filesystem::path target = std::filesystem::canonical(path, error);
-    const auto saved = save(error ? path.c_str() : target.c_str(), bytes);
-    return saved ? static_cast<int>(kDone) : complain(path, saved.error());
-}
-
-int write_output(const std::string& path, std::string_view text) {
-    return write_output(path, std::as_bytes(std::span(text.data(), text.size())));
-}
-
 void print(std::string_view text) {
+    printed = true;
     if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() && output_errno == 0) output_errno = errno;
 }
 
-int finish_output(int code) {
+int flush_output() {
     if (std::fflush(stdout) != 0 && output_errno == 0) output_errno = errno;
-    if (output_errno == 0) return code;
-    return complain("standard output",
-                    Error{ErrorCode::io, "cannot write all of it", static_cast<uint64_t>(output_errno)});
+    return std::exchange(output_errno, 0);
 }
 
-void catch_signals() {
-    struct sigaction action {};
-    action.sa_handler = on_signal;
-    // A second Ctrl-C ends the program at once.
-    action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
-    ::sigaction(SIGINT, &action, nullptr);
-    ::sigaction(SIGTERM, &action, nullptr);
-    ::signal(SIGXFSZ, SIG_IGN); // let write() say EFBIG, so that the temporary file is removed
+int finish_output(int code) {
+    const int error = flush_output();
+    return error == 0 || error == EPIPE ? code : complain_of_output(error);
 }
 
-bool interrupted() noexcept {
-    return interrupted_flag.load();
+int complain_of_output(int error) {
+    return complain("standard output", Error{ErrorCode::io, "cannot write all of it", static_cast<uint64_t>(error)});
 }
 
-ProgressLine::ProgressLine(std::string label) : label_(std::move(label)), terminal_(::isatty(STDERR_FILENO) == 1) {}
-
-ProgressLine::~ProgressLine() {
-    if (dirty_) std::fputs("\r\x1b[K", stderr);
+void report_errors_as_json() {
+    json_errors = true;
 }
 
-bool ProgressLine::show(std::string_view stage, double fraction, uint32_t nodes) {
-    const Clock::time_point now = Clock::now();
-    if (terminal_ && (!dirty_ || now - drawn_ > std::chrono::milliseconds(100))) {
-        const double seconds = std::chrono::duration<double>(now - start_).count();
-        const std::string count = nodes > 0 ? fmt::format("  {} nodes", grouped(nodes)) : "";
-        const auto left = remaining_.after(seconds, fraction);
-        fmt::print(stderr, "\r\x1b[K{}{:<12} {:3.0f} %{}  {:.0f} s{}", label_, stage, 100 * fraction, count, seconds,
-                   left ? fmt::format(", about {} left", rounded_time(*left)) : "");
-        std::fflush(stderr);
-        drawn_ = now;
-        dirty_ = true;
-    }
-    return !interrupted();
+void finish_with_json(int code) {
+    if (!json_errors || printed || code == kDone || last_complaint.code == kDone) return;
+    const nlohmann::ordered_json error{{"error",
+                                        {{"code", code},
+                                         {"subject", last_complaint.subject},
+                                         {"what", last_complaint.what},
+                                         {"advice", last_complaint.advice}}}};
+    const std::string text = error.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+    if (output_taken)
+        fmt::print(stderr, "{}", text);
+    else
+        print(text);
+}
+
+void take_standard_output() {
+    output_taken = true;
 }
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {

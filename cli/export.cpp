@@ -1,6 +1,8 @@
 // prolate export: the tree's ellipsoids for other programs.
 #include "cli/common.hpp"
 #include "cli/export_formats.hpp"
+#include "cli/outputs.hpp"
+#include "cli/view_option.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -22,26 +24,35 @@ are the ellipsoids, and json adds the triangles of each leaf, as places in the f
 
   csv   level,cx,cy,cz,r1,r2,r3,R11,...,R33: center, radii, and the rotation row by row; its column i is the direction
         of radius i
-  json  the same and the tree's links, in full precision
-  ply, obj  ellipsoids as meshes, their corners on the ellipsoids; a color for each corner; obj names each by its node
+  json  the same, the factor L of {center + L u : |u| <= 1}, row by row, and the tree's links
+  ply, obj  ellipsoids as meshes
   glb   glTF 2.0, for Blender and viewers: one sphere, and a node for each ellipsoid that moves, turns and stretches it
   pov   a POV-Ray scene with true ellipsoids, a camera, an area light and a ground plane
+
+What covers: centers and factors (json, pov) are exact, also as read in single precision. Radii (csv, json) are rounded
+up, and cover as read in double precision; in single precision, multiply them by 1 + 3e-7 r1 / r3. Meshes for collision
+- ply and obj, unless --no-outer is given - have their triangles outside the ellipsoids, as read in single precision,
+and cover. Pictures - glb, unless --outer is given - have their corners on the ellipsoids, and do not.
+
+obj for collision has no parts and no colors, because simulators drop triangles of parts; many of them take the convex
+hull of a whole file. With --no-outer, obj names each ellipsoid by its node. ply has a color for each corner.
 
 Colors are those of "prolate render": a hue for each child of the root, which all below it keep.
 
 Examples:
-  prolate export horse.etree -o horse.csv --level 2
+  prolate export horse.etree -o cover.csv --level 2
   prolate export horse.etree -o - --format csv | wc -l
-  prolate export horse.etree -o horse.glb --level 2
-  prolate export horse.etree -o horse.obj --segments 64
-  prolate export horse.etree -o horse.pov && povray +Ihorse.pov +W1200 +H900 +A0.1)";
+  prolate export horse.etree -o cover.glb --level 2
+  prolate export horse.etree -o cover.obj --segments 64
+  prolate export horse.etree -o cover.pov && povray +Icover.pov +W1200 +H900 +A0.1)";
 
 struct ExportArguments {
     std::string tree, output, format;
     std::optional<uint32_t> level;
     uint32_t segments = 32;
-    std::vector<double> view = {View{}.azimuth, View{}.elevation};
-    std::string up = "y";
+    std::optional<bool> outer;
+    ViewWords view;
+    Outputs outputs;
 };
 
 void add_cut(const TreeView& tree, uint32_t level, Selection& to) {
@@ -71,33 +82,37 @@ Selection cut_at(const TreeView& tree, uint32_t level) {
     return out;
 }
 
-std::string picture(const TreeView& tree, std::string_view format, const ExportArguments& a) {
+std::string picture(const TreeView& tree, std::string_view format, const ExportArguments& a, const View& view) {
     const std::vector<Piece> pieces = pieces_of(tree, a.level.value_or(tree.level_count() - 1));
-    if (format == "ply") return as_ply(pieces, a.segments);
-    if (format == "obj") return as_obj(pieces, a.segments);
-    if (format == "glb") return as_glb(pieces, a.segments);
-    const auto axis = std::find(std::begin(kUpAxes), std::end(kUpAxes), a.up) - std::begin(kUpAxes);
-    return as_pov(pieces, {a.view[0], a.view[1], static_cast<UpAxis>(axis)});
+    const Facets facets = a.outer.value_or(format != "glb") ? Facets::outer : Facets::inscribed;
+    if (format == "ply") return as_ply(pieces, a.segments, facets);
+    if (format == "obj") return as_obj(pieces, a.segments, facets);
+    if (format == "glb") return as_glb(pieces, a.segments, facets);
+    return as_pov(pieces, view);
 }
 
-int run(const ExportArguments& a) {
+int run(ExportArguments& a) {
     const std::string format = a.format.empty() ? extension(a.output) : a.format;
     if (std::find(std::begin(kFormats), std::end(kFormats), format) == std::end(kFormats))
         return complain(kUsage, format.empty() ? a.output : format,
                         format.empty() ? "the format is not clear from the name" : "no such export format",
                         "use csv, json, ply, obj, glb or pov, as the extension or with --format");
-    int code = check_output(a.output);
-    if (code != kDone) return code;
+    int code = kDone;
+    const auto viewer = view_of(a.view, code);
+    if (!viewer) return code;
+    a.outputs.reads(a.tree, "the tree");
+    if (code = a.outputs.claim(a.output, "the output", format); code != kDone) return code;
     const auto tree = read_tree(a.tree, code);
     if (!tree) return code;
     const TreeView view = tree->view();
     if (a.level && *a.level >= view.level_count())
         return complain(kUsage, "--level", fmt::format("the tree has no level {}", *a.level),
                         fmt::format("its levels are 0 to {}", view.level_count() - 1));
-    if (format == "csv") return write_output(a.output, as_csv(view, a.level ? cut_at(view, *a.level) : all_cuts(view)));
+    if (format == "csv")
+        return a.outputs.write(a.output, as_csv(view, a.level ? cut_at(view, *a.level) : all_cuts(view)));
     if (format == "json")
-        return write_output(a.output, as_json(view, a.level ? cut_at(view, *a.level) : all_nodes(view)));
-    return write_output(a.output, picture(view, format, a));
+        return a.outputs.write(a.output, as_json(view, a.level ? cut_at(view, *a.level) : all_nodes(view)));
+    return a.outputs.write(a.output, picture(view, format, a, *viewer));
 }
 
 } // namespace
@@ -105,20 +120,18 @@ int run(const ExportArguments& a) {
 void add_export(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<ExportArguments>();
     CLI::App* command = app.add_subcommand("export", "Write a tree's ellipsoids as csv, json, ply, obj, glb or pov");
-    command->add_option("tree", a->tree, "the .etree file")->required();
+    command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_option("-o,--output", a->output, "the file to write, or - for standard output")->required();
     command->add_option("--format", a->format, "csv, json, ply, obj, glb or pov (default: the output's extension)");
     command->add_option("--level", a->level, "export the cut at this level, 0 = the root");
     command->add_option("--segments", a->segments, "ply, obj, glb: of a section through an ellipsoid, in steps of 4")
         ->check(CLI::Range(4u, kMaxSegments))
         ->capture_default_str();
-    command
-        ->add_option("--view", a->view, "pov: where the viewer stands: azimuth and elevation, degrees (default: 30,18)")
-        ->delimiter(',')
-        ->expected(2);
-    command->add_option("--up", a->up, "pov: the model's axis that points up")
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
-        ->capture_default_str();
+    command->add_flag_function(
+        "--outer,!--no-outer", [a](int64_t count) { a->outer = count > 0; },
+        "ply, obj, glb: triangles outside the ellipsoids, so that the meshes cover (default: not for glb)");
+    declare_view(*command, a->view, "pov: ");
+    a->outputs.declare(*command);
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }

@@ -1,7 +1,7 @@
 // glb: the binary form of glTF 2.0, after the Khronos specification (section 4.4 for the container).
 //
 // Core glTF gives a material to a mesh's part, not to a node, so there is a mesh for each colour; all of them share the
-// one sphere's corners and triangles. A sphere's corners are its normals, too: one accessor serves as both.
+// one sphere's corners and triangles. The unit sphere's corners are its normals, too: one accessor serves as both.
 #include "cli/export_formats.hpp"
 #include "cli/export_sphere.hpp"
 #include "cli/little_endian.hpp"
@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include <glm/gtc/quaternion.hpp>
 
@@ -34,34 +35,44 @@ void pad(std::string& chunk, char with) {
     while (chunk.size() % 4 != 0) chunk += with;
 }
 
-void add_sphere(Json& gltf, std::string& binary, const SphereMesh& sphere) {
+using Corners = std::vector<std::array<double, 3>>;
+
+void add_corners(Json& gltf, std::string& binary, const Corners& corners) {
     std::array<float, 3> low{}, high{};
-    for (const auto& vertex : sphere.vertices)
+    const size_t begin = binary.size();
+    for (const auto& corner : corners)
         for (size_t i = 0; i < 3; ++i) {
-            const auto x = static_cast<float>(vertex[i]);
+            const auto x = static_cast<float>(corner[i]);
             append_little_endian(binary, x);
             low[i] = std::min(low[i], x), high[i] = std::max(high[i], x);
         }
-    const size_t corners = binary.size();
+    gltf["accessors"].push_back({{"bufferView", gltf["bufferViews"].size()},
+                                 {"componentType", kFloat},
+                                 {"count", corners.size()},
+                                 {"type", "VEC3"},
+                                 {"min", low},
+                                 {"max", high}});
+    gltf["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", binary.size() - begin}, {"target", kVertices}});
+}
+
+// Accessors: positions, indices, and normals where they are not the same as the positions.
+void add_sphere(Json& gltf, std::string& binary, const SphereMesh& sphere, const Corners& normals) {
+    add_corners(gltf, binary, sphere.vertices);
+    const size_t begin = binary.size();
     for (const auto& triangle : sphere.triangles)
         for (const uint32_t corner : triangle) append_little_endian(binary, static_cast<uint16_t>(corner));
-    const size_t indices = binary.size() - corners;
+    gltf["accessors"].push_back({{"bufferView", 1},
+                                 {"componentType", kUint16},
+                                 {"count", 3 * sphere.triangles.size()},
+                                 {"type", "SCALAR"},
+                                 {"min", {0}},
+                                 {"max", {sphere.vertices.size() - 1}}});
+    gltf["bufferViews"].push_back(
+        {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", binary.size() - begin}, {"target", kIndices}});
     pad(binary, '\0');
+    if (!normals.empty()) add_corners(gltf, binary, normals);
     gltf["buffers"] = {{{"byteLength", binary.size()}}};
-    gltf["bufferViews"] = {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", corners}, {"target", kVertices}},
-                           {{"buffer", 0}, {"byteOffset", corners}, {"byteLength", indices}, {"target", kIndices}}};
-    gltf["accessors"] = {{{"bufferView", 0},
-                          {"componentType", kFloat},
-                          {"count", sphere.vertices.size()},
-                          {"type", "VEC3"},
-                          {"min", low},
-                          {"max", high}},
-                         {{"bufferView", 1},
-                          {"componentType", kUint16},
-                          {"count", 3 * sphere.triangles.size()},
-                          {"type", "SCALAR"},
-                          {"min", {0}},
-                          {"max", {sphere.vertices.size() - 1}}}};
 }
 
 // The name of a colour: "#E69F00".
@@ -71,8 +82,13 @@ std::string hexadecimal(const glm::dvec3& colour) {
     return name;
 }
 
-Json node_of(const Piece& piece, size_t mesh) {
-    const PrincipalAxes axes = principal_axes(piece.shape);
+// A reader in single precision makes a matrix of the rotation and the scale, and moves a corner by some 30 roundings,
+// of numbers no larger than the corner's own.
+constexpr int kReaderBits = 24 - 5;
+
+Json node_of(const Piece& piece, size_t mesh, double growth) {
+    PrincipalAxes axes = principal_axes(piece.shape);
+    for (double& radius : axes.radii) radius *= growth;
     glm::dmat3 rotation; // by columns
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 3; ++column) rotation[column][row] = axes.rotation[row][column];
@@ -87,7 +103,9 @@ Json node_of(const Piece& piece, size_t mesh) {
 
 } // namespace
 
-std::string as_glb(std::span<const Piece> pieces, uint32_t segments) {
+std::string as_glb(std::span<const Piece> pieces, uint32_t segments, Facets facets) {
+    const SphereMesh sphere = sphere_mesh(segments, facets);
+    const bool outer = facets == Facets::outer;
     Json gltf;
     std::string binary;
     gltf["asset"] = {{"version", "2.0"},
@@ -107,19 +125,20 @@ std::string as_glb(std::span<const Piece> pieces, uint32_t segments) {
                                   {{"baseColorFactor", {piece.colour.x, piece.colour.y, piece.colour.z, 1.0}},
                                    {"metallicFactor", 0.0},
                                    {"roughnessFactor", 0.6}}}});
-            meshes.push_back(
-                {{"name", "sphere " + name},
-                 {"primitives",
-                  {{{"attributes", {{"POSITION", 0}, {"NORMAL", 0}}}, {"indices", 1}, {"material", mesh}}}}});
+            meshes.push_back({{"name", "sphere " + name},
+                              {"primitives",
+                               {{{"attributes", {{"POSITION", 0}, {"NORMAL", outer ? 2 : 0}}},
+                                 {"indices", 1},
+                                 {"material", mesh}}}}});
         }
-        nodes.push_back(node_of(piece, mesh));
+        nodes.push_back(node_of(piece, mesh, outer ? growth_for_rounding(piece.shape, sphere, kReaderBits) : 1));
         cover["children"].push_back(nodes.size()); // after the cover itself
     }
     nodes.insert(nodes.begin(), cover);
     gltf["nodes"] = std::move(nodes);
     gltf["meshes"] = std::move(meshes);
     gltf["materials"] = std::move(materials);
-    add_sphere(gltf, binary, sphere_mesh(segments));
+    add_sphere(gltf, binary, sphere, outer ? sphere_mesh(segments).vertices : Corners());
 
     std::string text = gltf.dump();
     pad(text, ' ');

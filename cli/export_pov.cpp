@@ -22,6 +22,11 @@ std::string vector(const dvec3& v) {
     return fmt::format("<{:.14g}, {:.14g}, {:.14g}>", v.x, v.y, v.z);
 }
 
+// All digits: POV-Ray reads doubles, and the shortest digits that tell a float from others are not its value.
+double exact(float x) {
+    return x;
+}
+
 // How far the cover reaches along `n`: the largest n.p of its points.
 double extent(std::span<const Piece> pieces, const dvec3& n) {
     double farthest = -std::numeric_limits<double>::infinity();
@@ -41,8 +46,9 @@ void add_cover(std::string& out, std::span<const Piece> pieces) {
         fmt::format_to(to,
                        "  sphere {{ 0, 1 matrix <{}, {}, {}, 0, {}, {}, 0, 0, {}, {}, {}, {}> "
                        "pigment {{ color rgb <{:.4f}, {:.4f}, {:.4f}> }} }} // node {}\n",
-                       e.l11, e.l21, e.l31, e.l22, e.l32, e.l33, e.center.x, e.center.y, e.center.z, piece.colour.x,
-                       piece.colour.y, piece.colour.z, piece.node);
+                       exact(e.l11), exact(e.l21), exact(e.l31), exact(e.l22), exact(e.l32), exact(e.l33),
+                       exact(e.center.x), exact(e.center.y), exact(e.center.z), piece.colour.x, piece.colour.y,
+                       piece.colour.z, piece.node);
     }
     out += "  finish { ambient 0.10 diffuse 0.72 specular 0.12 roughness 0.03 }\n}\n";
 }

@@ -8,8 +8,29 @@
 #include <utility>
 
 namespace prolate::cli {
+namespace {
 
-SphereMesh sphere_mesh(uint32_t segments) {
+constexpr double kRounding = 1 + 0x1p-40; // more than that of what is computed below
+
+// A triangle with the unit normal n lies at n.v = h. If each corner moves out by at least 1 / h, all its points have
+// n.x >= 1, and |x| >= 1.
+void move_out(SphereMesh& mesh) {
+    using Point = std::array<double, 3>;
+    std::vector<double> scale(mesh.vertices.size(), 1);
+    for (const auto& [a, b, c] : mesh.triangles) {
+        const Point &p = mesh.vertices[a], &q = mesh.vertices[b], &r = mesh.vertices[c];
+        const Point d{q[0] - p[0], q[1] - p[1], q[2] - p[2]}, e{r[0] - p[0], r[1] - p[1], r[2] - p[2]};
+        const Point n{d[1] * e[2] - d[2] * e[1], d[2] * e[0] - d[0] * e[2], d[0] * e[1] - d[1] * e[0]};
+        const double height = (n[0] * p[0] + n[1] * p[1] + n[2] * p[2]) / std::hypot(n[0], n[1], n[2]);
+        for (const uint32_t corner : {a, b, c}) scale[corner] = std::max(scale[corner], kRounding / height);
+    }
+    for (size_t i = 0; i < scale.size(); ++i)
+        for (double& x : mesh.vertices[i]) x *= scale[i];
+}
+
+} // namespace
+
+SphereMesh sphere_mesh(uint32_t segments, Facets facets) {
     const uint32_t edge = std::max(1u, (segments + 3) / 4); // of the octahedron, in parts
     SphereMesh mesh;
     const auto points = [edge](uint32_t ring) { return std::max(1u, 4 * std::min(ring, 2 * edge - ring)); };
@@ -48,7 +69,19 @@ SphereMesh sphere_mesh(uint32_t segments) {
                 if (i + 1 < sides) add(at(inner, in), at(outer, out + 1), at(inner, in + 1));
             }
     }
+    if (facets == Facets::outer) move_out(mesh);
     return mesh;
+}
+
+// A corner at x = c + L w moves by at most 2^-bits sqrt(3) |x|, |x| <= |c| + r1 |w|, and all points of a triangle by no
+// more than its corners. Where the ellipsoid is the unit ball, that is 1 / r3 times as much, at most, which the growth
+// pays for twice.
+double growth_for_rounding(const Ellipsoid& e, const SphereMesh& sphere, int bits) {
+    const PrincipalAxes axes = principal_axes(e);
+    double farthest = 0;
+    for (const auto& w : sphere.vertices) farthest = std::max(farthest, std::hypot(w[0], w[1], w[2]));
+    const double reach = std::hypot(e.center.x, e.center.y, e.center.z) + axes.radii[0] * farthest;
+    return 1 + std::ldexp(4, -bits) * reach / axes.radii[2];
 }
 
 } // namespace prolate::cli

@@ -45,7 +45,7 @@ std::string as_json(const TreeView& tree) {
 
 std::string as_text(const std::string& name, const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
-    std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", name, kFormatVersion,
+    std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", visible(name), kFormatVersion,
                                   grouped(tree.bytes().size()));
     if (tree.is_prefix()) out += "  a prefix of a longer file: a coarser tree\n";
     out += fmt::format("  nodes     {} in {} levels, degree {}; {} blocks, {:.1f} bytes a node\n",
@@ -62,6 +62,12 @@ std::string as_text(const std::string& name, const TreeView& tree) {
         out += fmt::format("  covers    {} of volume {:.6g} (+/- {:.0e}), diagonal {:.6g}\n",
                            info.exact ? "the surface of a solid" : "a solid", info.solid_volume,
                            info.solid_volume * double{info.solid_volume_error}, info.diagonal);
+    if (const auto& [x, y, z] = info.placement.scale; info.placement.scale != Placement{}.scale)
+        out += fmt::format("  scale     the mesh's file times {:g}, {:g}, {:g}\n", x, y, z);
+    if (const auto& [x, y, z] = info.placement.origin; info.placement.origin != Placement{}.origin)
+        out += fmt::format(
+            "  origin    ({:.12g}, {:.12g}, {:.12g}): all coordinates here and in answers are relative to it\n", x, y,
+            z);
     if (!info.exact)
         out += fmt::format("  baked     method {}, primitive {}, quality {}, alpha {:g}, beta {:g}, seed {}, "
                            "resolution {}\n",
@@ -91,7 +97,7 @@ int run(const InfoArguments& a) {
 void add_info(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<InfoArguments>();
     CLI::App* command = app.add_subcommand("info", "Show what an .etree file holds and how it was made");
-    command->add_option("tree", a->tree, "the .etree file")->required();
+    command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_flag("--json", a->json, "print JSON");
     command->footer(std::string(kLevelTableHelp) + kExamples);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

@@ -1,5 +1,6 @@
 #include "cli/levels.hpp"
 
+#include "cli/generator.hpp"
 #include "cli/grouped.hpp"
 
 #include <fmt/format.h>
@@ -116,12 +117,17 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["solid_volume"] = info.solid_volume;
     out["solid_volume_error"] = shortest(info.solid_volume * double{info.solid_volume_error});
     out["diagonal"] = info.diagonal;
+    out["scale"] = info.placement.scale;
+    out["origin"] = info.placement.origin;
+    out["weld"] = info.weld < 0 ? nlohmann::ordered_json("default") : nlohmann::ordered_json(shortest(info.weld));
     out["resolution"] = info.resolution;
     return out;
 }
 
 std::string text_of(const nlohmann::ordered_json& json) {
-    return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
+    nlohmann::ordered_json out{{"generator", generator()}};
+    out.update(json);
+    return out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n';
 }
 
 const char* name_of(Method method) {

@@ -28,7 +28,7 @@ nlohmann::ordered_json level_json(const TreeView& tree, uint32_t level);
 /// All that the header says.
 nlohmann::ordered_json header_json(const TreeView& tree);
 
-/// Indented, with a line's end. A file name that is no UTF-8 is no reason to fail.
+/// Indented, with a line's end, and first of all who wrote it. A file name that is no UTF-8 is no reason to fail.
 std::string text_of(const nlohmann::ordered_json& json);
 
 /// The names that the command line has for them.

@@ -1,5 +1,7 @@
 // prolate: the command line. Parses, then runs one command; exit codes are in common.hpp.
 #include "cli/common.hpp"
+#include "cli/generator.hpp"
+#include "cli/signals.hpp"
 
 #include <prolate/version.hpp>
 
@@ -7,7 +9,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <new>
+#include <vector>
 
 namespace prolate::cli {
 namespace {
@@ -16,14 +18,18 @@ constexpr const char* kFooter = R"(
 Examples:
   prolate bake horse.obj -o horse.etree --levels 3
   prolate verify horse.etree horse.obj
-  prolate export horse.etree -o horse.csv --level 2
+  prolate export horse.etree -o cover.csv --level 2
   prolate view horse.etree horse.obj -o horse.html
   prolate collide horse.etree horse.etree --pose 0.5,0,0
 
-Exit codes: 0 done, 1 the answer is "no" (verify) or some assets failed (bake --manifest), 2 usage, 3 bad input,
-4 reading or writing failed, 5 an error in prolate itself, 130 interrupted.
+A file may be -: standard input or output.
 
-'prolate COMMAND --help' tells more.)";
+Exit codes: 0 done, 1 the answer is "no" (verify, collide --exit-code) or some assets failed (bake --manifest), 2 usage,
+3 bad input, 4 reading or writing failed, or memory or threads are short, 5 an error in prolate itself, 6 undecided
+(collide --exit-code), 130 interrupted (128 and the number of the signal). With --json, an error is printed as JSON, too:
+{"error": {"code", "subject", "what", "advice"}}.
+
+'prolate COMMAND --help' or 'prolate help COMMAND' tells more; 'prolate man' is all of it in one page.)";
 
 // "did you mean 'bake'?", or where to look.
 std::string hint(std::string_view word, const std::vector<std::string>& known, const std::string& otherwise) {
@@ -54,10 +60,31 @@ int check_words(const CLI::App& app, const std::vector<std::string>& words) {
     return kDone;
 }
 
-int run(int argc, char** argv) {
+// A whole number, of digits only: the parser would take "" for 0 and -1 for 2^64 - 1.
+std::string check_number(const std::string& word) {
+    const bool digits = std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; });
+    return digits && !word.empty() ? "" : fmt::format("\"{}\" is no whole number, 0 or above", word);
+}
+std::string check_not_empty(const std::string& word) {
+    return word.empty() ? "its value is empty" : "";
+}
+
+// What all commands have in common.
+void complete(CLI::App& app) {
+    for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+        command->add_flag_callback("-q,--quiet", be_quiet,
+                                   "no notes, no progress, no table beside a file: errors only");
+        for (CLI::Option* option : command->get_options()) {
+            if (option->get_items_expected_max() == 0) continue;
+            const bool number = option->get_type_name() == "UINT";
+            option->check(CLI::Validator(number ? check_number : check_not_empty, ""));
+        }
+    }
+}
+
+int run(std::vector<std::string> words) {
     CLI::App app("prolate: collision detection on ellipsoid trees", "prolate");
-    app.set_version_flag("--version", fmt::format("prolate {}.{}.{} (.etree format {})", PROLATE_VERSION_MAJOR,
-                                                  PROLATE_VERSION_MINOR, PROLATE_VERSION_PATCH, kFormatVersion));
+    app.set_version_flag("--version", fmt::format("{} (.etree format {})", generator(), kFormatVersion));
     app.footer(kFooter);
     app.require_subcommand(1);
     Work chosen;
@@ -68,18 +95,28 @@ int run(int argc, char** argv) {
     add_collide(app, chosen);
     add_render(app, chosen);
     add_view(app, chosen);
-    if (const int code = check_words(app, {argv + 1, argv + argc}); code != kDone) return code;
+    add_completion(app, chosen);
+    add_man(app, chosen);
+    complete(app);
+    if (!words.empty() && words[0] == "help") { // help COMMAND is COMMAND --help
+        words.erase(words.begin());
+        words.resize(std::min<size_t>(words.size(), 1));
+        words.push_back("--help");
+    }
+    if (const int code = check_words(app, words); code != kDone) return code;
+    const std::string name = words[0];
     try {
-        app.parse(argc, argv);
+        std::reverse(words.begin(), words.end()); // as CLI11 wants it
+        app.parse(words);
     } catch (const CLI::ParseError& e) {
-        if (e.get_exit_code() == 0) return finish_output(app.exit(e)); // --help, --version
+        if (e.get_exit_code() == 0) return app.exit(e); // --help, --version
         const auto used = app.get_subcommands();
         const std::string command = used.empty() ? "" : used[0]->get_name() + " ";
         return complain(kUsage, used.empty() ? "usage" : used[0]->get_name(), e.what(),
                         fmt::format("see 'prolate {}--help'", command));
     }
-    catch_signals();
-    return finish_output(chosen());
+    catch_signals(name.c_str());
+    return chosen();
 }
 
 } // namespace
@@ -87,11 +124,11 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
     using namespace prolate::cli;
-    try {
-        return run(argc, argv);
-    } catch (const std::bad_alloc&) {
-        return complain(kIo, "memory", "there is not enough of it", "try a smaller mesh or fewer levels");
-    } catch (const std::exception& e) {
-        return complain(kInternal, "internal error", e.what(), "please report this");
-    }
+    const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    if (std::find(words.begin(), std::find(words.begin(), words.end(), "--"), "--json") != words.end())
+        report_errors_as_json();
+    const int code = guarded([&words] { return run(words); });
+    finish_with_json(code);
+    const int finished = finish_output(code);
+    return finished == kInterrupted && interrupted() ? 128 + interrupted() : finished;
 }

@@ -3,6 +3,7 @@
 #include "cli/bake_asset.hpp"
 #include "cli/common.hpp"
 #include "cli/levels.hpp"
+#include "cli/signals.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -12,9 +13,7 @@
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
-#include <map>
 #include <vector>
 
 namespace prolate::cli {
@@ -35,15 +34,13 @@ struct Entry {
 
 // Reads and parses the file; complains and sets `code` if it cannot.
 Json read_json(const std::string& path, int& code) {
-    errno = 0;
-    std::ifstream file(path, std::ios::binary);
-    const std::string text(std::istreambuf_iterator<char>(file), {});
-    if (!file || file.bad()) {
-        code = complain(path, Error{ErrorCode::io, "cannot read the manifest", static_cast<uint64_t>(errno)});
+    const auto text = read_file(path);
+    if (!text) {
+        code = complain(path, text.error());
         return {};
     }
     try {
-        return Json::parse(text);
+        return Json::parse(*text);
     } catch (const Json::exception& e) {
         std::string what = e.what(); // "[json.exception...] parse error at line 3, column 1: ..."
         if (const size_t at = what.find("] "); at != what.npos) what.erase(0, at + 2);
@@ -62,6 +59,11 @@ std::string wrong_type(const CLI::Option& option, const Json& value) {
     if (option.get_items_expected_max() == 0) return value.is_boolean() ? "" : "true or false";
     const std::string type = option.get_type_name();
     if (type == "UINT") return value.is_number_unsigned() ? "" : "a whole number, 0 or above";
+    if (option.get_items_expected_max() > 1) {
+        const auto is_number = [](const Json& one) { return one.is_number(); };
+        const bool sound = value.is_array() && std::all_of(value.begin(), value.end(), is_number);
+        return sound || value.is_number() ? "" : "a number or an array of numbers";
+    }
     if (type == "FLOAT") return value.is_number() ? "" : "a number";
     return value.is_string() ? "" : "a text";
 }
@@ -82,7 +84,8 @@ std::string set_options(const Json& values, Asset& asset) {
         if (value.is_boolean()) {
             if (value.get<bool>()) words.push_back("--" + key);
         } else {
-            const std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+            std::string text = value.is_string() ? value.get<std::string>() : value.dump();
+            if (value.is_array()) text = text.substr(1, text.size() - 2); // [1,2,3]
             if (text.empty()) return fmt::format("\"{}\" must not be empty", key);
             if (positional)
                 asset.mesh = text;
@@ -110,20 +113,6 @@ Json merged(Json defaults, const Json& entry) {
     defaults.update(entry);
     return defaults;
 }
-
-// Who reads or writes which file of a run, so that nothing is overwritten that another one needs.
-class Claims {
-public:
-    // Says who had the file before, or "".
-    std::string claim(const std::string& file, const std::string& owner) {
-        std::error_code none;
-        const auto [place, added] = owners_.emplace(fs::weakly_canonical(file, none), owner);
-        return added ? "" : place->second;
-    }
-
-private:
-    std::map<fs::path, std::string> owners_;
-};
 
 // All entries, badly written ones with their error; or complains and sets `code`.
 std::vector<Entry> read_manifest(const std::string& path, const ManifestOptions& options, int& code) {
@@ -163,6 +152,7 @@ std::vector<Entry> read_manifest(const std::string& path, const ManifestOptions&
         for (std::string* file : {&asset.mesh, &asset.output, &asset.report}) {
             if (file->empty()) continue;
             if (file != &asset.mesh && is_standard_output(*file)) entry.error = "cannot go to standard output";
+            if (file == &asset.mesh && is_standard_input(*file)) entry.error = "cannot come from standard input";
             *file = (folder / *file).string();
         }
     }
@@ -174,26 +164,22 @@ std::string title(size_t index, const Entry& entry) {
 }
 
 // Complains of all that can be told without baking, and keeps it as the entry's error.
-void check(Entry& entry, size_t index, Claims& claims) {
-    const auto refuse = [&](const std::string& what) {
-        complain(kBadInput, title(index, entry), entry.error = what, "correct the manifest");
-    };
-    if (!entry.error.empty()) return refuse(entry.error);
-    {
-        const PartOfWork part(title(index, entry));
-        int code = kDone;
-        std::error_code none;
-        if (options_of(entry.asset, code) && !fs::exists(entry.asset.mesh, none))
-            complain(entry.asset.mesh, Error{ErrorCode::io, "cannot open the file", ENOENT});
-        entry.error = part.complaint();
+void check(Entry& entry, size_t index, Outputs& outputs) {
+    if (!entry.error.empty()) {
+        complain(kBadInput, title(index, entry), entry.error, "correct the manifest");
+        return;
     }
-    if (!entry.error.empty()) return;
-    for (const auto& [file, word] :
-         {std::pair(&entry.asset.output, "output"), std::pair(&entry.asset.report, "report")}) {
-        if (file->empty()) continue;
-        const std::string owner = claims.claim(*file, fmt::format("the {} of asset {}", word, index + 1));
-        if (!owner.empty()) return refuse(fmt::format("its {} {} is {}", word, *file, owner));
+    const PartOfWork part(title(index, entry));
+    int code = kDone;
+    std::error_code none;
+    if (!options_of(entry.asset, code)) {
+        // complained
+    } else if (!fs::exists(entry.asset.mesh, none)) {
+        complain(entry.asset.mesh, Error{ErrorCode::io, "cannot open the file", ENOENT});
+    } else {
+        claim_outputs(entry.asset, outputs, fmt::format(" of asset {}", index + 1));
     }
+    entry.error = part.complaint();
 }
 
 Json summary_json(const std::string& path, const std::vector<Entry>& entries) {
@@ -220,14 +206,14 @@ Json summary_json(const std::string& path, const std::vector<Entry>& entries) {
 
 std::string summary_table(const std::vector<Entry>& entries) {
     size_t width = 4;
-    for (const Entry& entry : entries) width = std::max(width, entry.name.size());
+    for (const Entry& entry : entries) width = std::max(width, visible(entry.name).size());
     std::string out = fmt::format("asset {:<{}} {:>8} {:>14} {:>12} {:>10}\n", "mesh", width, "nodes", "outside ratio",
                                   "bytes", "seconds");
     for (size_t i = 0; i < entries.size(); ++i) {
         const Entry& entry = entries[i];
-        out += fmt::format("{:>5} {:<{}} ", i + 1, entry.name, width);
+        out += fmt::format("{:>5} {:<{}} ", i + 1, visible(entry.name), width);
         if (!entry.report) {
-            out += entry.error.empty() ? "not done\n" : fmt::format("failed: {}\n", entry.error);
+            out += entry.error.empty() ? "not done\n" : fmt::format("failed: {}\n", visible(entry.error));
             continue;
         }
         const Json& report = *entry.report;
@@ -244,28 +230,29 @@ std::string summary_table(const std::vector<Entry>& entries) {
 
 } // namespace
 
-int bake_manifest(const std::string& path, BakeCache& cache, const ManifestOptions& options) {
+int bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache, const ManifestOptions& options) {
+    const GracefulStop keeps_what_is_done;
     int code = kDone;
     std::vector<Entry> entries = read_manifest(path, options, code);
     if (code != kDone) return code;
-    if (!options.report.empty())
-        if (code = check_output(options.report); code != kDone) return code;
     // What can be known at once is said at once, before hours of work.
-    Claims claims;
-    claims.claim(path, "the manifest");
-    if (!options.report.empty()) claims.claim(options.report, "the summary");
+    outputs.reads(path, "the manifest");
     for (size_t i = 0; i < entries.size(); ++i)
-        if (!entries[i].asset.mesh.empty())
-            claims.claim(entries[i].asset.mesh, fmt::format("the mesh of asset {}", i + 1));
-    for (size_t i = 0; i < entries.size(); ++i) check(entries[i], i, claims);
+        name_inputs(entries[i].asset, outputs, fmt::format(" of asset {}", i + 1));
+    if (code = outputs.claim(options.report, "the summary", "json"); code != kDone) return code;
+    for (size_t i = 0; i < entries.size(); ++i) check(entries[i], i, outputs);
 
     for (size_t i = 0; i < entries.size() && !interrupted(); ++i) {
         Entry& entry = entries[i];
         if (!entry.error.empty()) continue;
         const PartOfWork part(title(i, entry));
         const std::string label = fmt::format("[{}/{}] {}  ", i + 1, entries.size(), entry.name);
-        int failure = kDone;
-        const auto baked = bake_asset(entry.asset, cache, options.force, label, failure);
+        std::optional<Baked> baked;
+        const int failure = guarded([&] {
+            int failed = kDone;
+            baked = bake_asset(entry.asset, outputs, cache, options.rebake, label, failed);
+            return failed;
+        });
         if (baked) {
             entry.report = report_of(entry.asset, *baked);
             note(entry.asset.output, fmt::format("{}, {} nodes, {} bytes, {:.2f} s", name_of(baked->source),
@@ -277,9 +264,11 @@ int bake_manifest(const std::string& path, BakeCache& cache, const ManifestOptio
     }
     const Json summary = summary_json(path, entries);
     const std::string text = text_of(summary);
-    print(options.json ? text : summary_table(entries));
-    if (!options.report.empty())
-        if (code = write_output(options.report, text); code != kDone) return code;
+    if (options.json)
+        print(text);
+    else if (!is_quiet())
+        print(summary_table(entries));
+    if (code = outputs.write(options.report, text, Outputs::Effort::account); code != kDone) return code;
     if (const int not_done = summary["not_done"]; not_done > 0)
         return complain(kInterrupted, path,
                         fmt::format("interrupted with {} of {} assets not done", not_done, entries.size()),

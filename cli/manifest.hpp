@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/cache.hpp"
+#include "cli/outputs.hpp"
 
 #include <cstdint>
 #include <string>
@@ -9,7 +10,7 @@
 namespace prolate::cli {
 
 struct ManifestOptions {
-    bool force = false;   ///< bake even what is unchanged or cached
+    bool rebake = false;  ///< bake even what is unchanged or cached
     bool json = false;    ///< print the summary as JSON
     uint32_t threads = 0; ///< of assets that do not say it themselves
     std::string report;   ///< also write the summary to this JSON file, unless empty
@@ -17,6 +18,6 @@ struct ManifestOptions {
 
 /// Bakes the assets one after the other, each with a line on stderr, and prints a summary. Returns kDone, kNo if some
 /// assets failed, kInterrupted, or the code of an error in the manifest itself.
-int bake_manifest(const std::string& path, BakeCache& cache, const ManifestOptions& options);
+int bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache, const ManifestOptions& options);
 
 } // namespace prolate::cli

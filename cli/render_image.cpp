@@ -2,7 +2,20 @@
 
 #include <png.h>
 
+#include <cstddef>
+#include <span>
+
 namespace prolate::cli {
+namespace {
+
+// A chunk that names the program: length 16, tEXt, keyword and text, and their CRC. libpng's simple interface writes
+// none. It goes behind the first chunk, IHDR, whose size is fixed.
+constexpr char kSoftware[] = "\0\0\0\x10"
+                             "tEXtSoftware\0prolate"
+                             "\x4a\x80\xe5\xea";
+constexpr std::ptrdiff_t kAfterHeader = 8 + 12 + 13;
+
+} // namespace
 
 void draw_line(Sheet& sheet, const TextImage& line, uint32_t x0, uint32_t y0) {
     for (uint32_t y = 0; y < line.height && y0 + y < sheet.height; ++y)
@@ -28,6 +41,8 @@ Result<std::vector<std::byte>> encode_png(const Sheet& sheet) {
         bytes.resize(size);
         if (png_image_write_to_memory(&image, bytes.data(), &size, 0, sheet.rgb.data(), 0, nullptr)) {
             bytes.resize(size);
+            const auto software = std::as_bytes(std::span(kSoftware)).first(sizeof kSoftware - 1);
+            bytes.insert(bytes.begin() + kAfterHeader, software.begin(), software.end());
             return bytes;
         }
     }

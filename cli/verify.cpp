@@ -1,5 +1,8 @@
 // prolate verify: proves anew, from the file and the mesh alone, that every level of the tree covers.
 #include "cli/common.hpp"
+#include "cli/mesh_options.hpp"
+#include "cli/progress_line.hpp"
+#include "cli/threads.hpp"
 
 #include <prolate/verify.hpp>
 
@@ -14,7 +17,8 @@ namespace {
 
 constexpr const char* kFooter = R"(
 The proof knows nothing of how the tree was made. Exit code 0: every level covers; 1: some level does not, or it
-could not be proved. An open mesh has no inside; then only its triangles are proved. An exact tree must hold the mesh's
+could not be proved. The mesh is taken from its file as when the tree was baked: same unit, scale, local origin and weld,
+unless other ones are given. An open mesh has no inside; then only its triangles are proved. An exact tree must hold the mesh's
 triangles, each in one leaf, and in every ellipsoid above it.
 
 Examples:
@@ -23,6 +27,7 @@ Examples:
 
 struct VerifyArguments {
     std::string tree, mesh;
+    MeshOptions mesh_options;
     uint32_t threads = 0;
     bool json = false;
 };
@@ -80,21 +85,26 @@ std::string as_text(const VerifyReport& report) {
 }
 
 int run(const VerifyArguments& a) {
+    use_available_threads();
     int code = kDone;
     const auto tree = read_tree(a.tree, code);
     if (!tree) return code;
-    const auto mesh = read_mesh(a.mesh, code);
+    const BakeInfo info = tree->view().bake_info();
+    const auto import = import_options(a.mesh_options, code, info.placement);
+    if (!import) return code;
+    const auto mesh = read_mesh(a.mesh, code, *import);
     if (!mesh) return code;
-    const auto cleaned = clean(mesh->view());
+    const auto cleaned = clean(mesh->view(), info.weld);
     if (!cleaned) return complain(a.mesh, cleaned.error());
-    const bool same_mesh = hash(cleaned->mesh.view()) == tree->view().bake_info().source_hash;
+    describe_mesh(a.mesh, cleaned->report);
+    const bool same_mesh = hash(cleaned->mesh.view()) == info.source_hash;
     if (!same_mesh) note(a.tree, "this tree was baked from another mesh");
     const auto report = [&] {
         ProgressLine line;
         VerifyOptions options;
         options.threads = a.threads;
         options.progress = [&line](double fraction) { return line.show("prove", fraction); };
-        return verify(tree->view(), cleaned->mesh.view(), options);
+        return verify(tree->view(), mesh->view(), options);
     }();
     if (!report) return complain(a.mesh, report.error());
     print(a.json ? as_json(*report, same_mesh) : as_text(*report));
@@ -106,9 +116,10 @@ int run(const VerifyArguments& a) {
 void add_verify(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<VerifyArguments>();
     CLI::App* command = app.add_subcommand("verify", "Prove that every level of a tree covers a mesh");
-    command->add_option("tree", a->tree, "the .etree file")->required();
-    command->add_option("mesh", a->mesh, "the mesh that it should cover")->required();
-    command->add_option("--threads", a->threads, "0 = all cores")->capture_default_str();
+    command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
+    command->add_option("mesh", a->mesh, "the mesh that it should cover, or - for standard input")->required();
+    declare_mesh_options(*command, a->mesh_options, true);
+    command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

@@ -1,7 +1,11 @@
 // prolate view: trees to look at, and to move against each other, as one page for a browser.
 #include "cli/common.hpp"
+#include "cli/mesh_options.hpp"
+#include "cli/outputs.hpp"
 #include "cli/pose.hpp"
+#include "cli/progress_line.hpp"
 #include "cli/render_panel.hpp"
+#include "cli/threads.hpp"
 #include "cli/view_scene.hpp"
 
 #include <prolate/version.hpp>
@@ -33,6 +37,8 @@ Examples:
 struct ViewArguments {
     std::vector<std::string> files;
     std::string output, up = "y", pose;
+    MeshOptions mesh_options;
+    Outputs outputs;
 };
 
 bool is_tree(const std::string& path) {
@@ -60,7 +66,7 @@ struct Asset {
 std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& files) {
     std::vector<Asset> assets;
     for (const std::string& path : files) {
-        if (is_tree(path))
+        if (is_tree(path) || (assets.empty() && is_standard_input(path)))
             assets.push_back({path, "", {}, {}, true});
         else if (!assets.empty() && assets.back().mesh_path.empty())
             assets.back().mesh_path = path;
@@ -70,7 +76,7 @@ std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& fil
     return assets;
 }
 
-int read_asset(Asset& asset) {
+int read_asset(Asset& asset, const MeshOptions& mesh_options) {
     int code = kDone;
     asset.tree = read_tree(asset.tree_path, code);
     if (!asset.tree) return code;
@@ -78,17 +84,21 @@ int read_asset(Asset& asset) {
         if (asset.tree->view().has_triangles()) asset.mesh = mesh_of(asset.tree->view());
         return kDone;
     }
-    const auto raw = read_mesh(asset.mesh_path, code);
+    const BakeInfo info = asset.tree->view().bake_info();
+    const auto import = import_options(mesh_options, code, info.placement);
+    if (!import) return code;
+    const auto raw = read_mesh(asset.mesh_path, code, *import);
     if (!raw) return code;
-    auto cleaned = clean(raw->view());
+    auto cleaned = clean(raw->view(), info.weld);
     if (!cleaned) return complain(asset.mesh_path, cleaned.error());
-    asset.own_mesh = hash(cleaned->mesh.view()) == asset.tree->view().bake_info().source_hash;
+    asset.own_mesh = hash(cleaned->mesh.view()) == info.source_hash;
     if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
     asset.mesh = std::move(*cleaned);
     return kDone;
 }
 
-int run(const ViewArguments& a) {
+int run(ViewArguments& a) {
+    use_available_threads();
     if (const std::string kind = extension(a.output); !kind.empty() && kind != "html" && kind != "htm")
         return complain(kUsage, a.output, "view writes HTML files only", "end the name in .html");
     auto assets = sort_files(a.files);
@@ -107,7 +117,11 @@ int run(const ViewArguments& a) {
     if (two && !has_query_module())
         return complain(kUsage, "view", "this prolate was built without emscripten, so its pages cannot answer queries",
                         "view one tree, or install emscripten and build prolate again");
-    if (const int code = check_output(a.output); code != kDone) return code;
+    for (const Asset& asset : *assets) {
+        a.outputs.reads(asset.tree_path, "the tree");
+        a.outputs.reads(asset.mesh_path, "the mesh");
+    }
+    if (const int code = a.outputs.claim(a.output, "the page", "html"); code != kDone) return code;
 
     nlohmann::ordered_json scene{
         {"version", fmt::format("{}.{}.{}", PROLATE_VERSION_MAJOR, PROLATE_VERSION_MINOR, PROLATE_VERSION_PATCH)},
@@ -119,7 +133,7 @@ int run(const ViewArguments& a) {
     scene["bodies"] = nlohmann::ordered_json::array();
     NumberBlock numbers;
     for (Asset& asset : *assets) {
-        if (const int code = read_asset(asset); code != kDone) return code;
+        if (const int code = read_asset(asset, a.mesh_options); code != kDone) return code;
         ProgressLine line;
         auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
                                std::move(asset.mesh), asset.own_mesh},
@@ -127,7 +141,7 @@ int run(const ViewArguments& a) {
         if (!body) return complain("view", Error{ErrorCode::cancelled});
         scene["bodies"].push_back(std::move(*body));
     }
-    return write_output(a.output, view_page(scene, numbers, two));
+    return a.outputs.write(a.output, view_page(scene, numbers, two), Outputs::Effort::long_);
 }
 
 } // namespace
@@ -139,10 +153,12 @@ void add_view(CLI::App& app, Work& chosen) {
         ->required()
         ->type_name("TREE [MESH] [TREE [MESH]]");
     command->add_option("-o,--output", a->output, "the HTML file to write, or - for standard output")->required();
+    declare_mesh_options(*command, a->mesh_options, true);
     command->add_option("--pose", a->pose, "of the second body in the frame of the first: tx,ty,tz[,qx,qy,qz,qw]");
     command->add_option("--up", a->up, "the models' axis that points up")
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
         ->capture_default_str();
+    a->outputs.declare(*command);
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }

@@ -3,8 +3,6 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS prolate_core prolate_query EXPORT prolate-query-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-set(prolate_headers error.hpp types.hpp tree.hpp query.hpp collide.hpp distance.hpp contacts.hpp sweep.hpp pairs.hpp bounds.hpp jobs.hpp world.hpp version.hpp
-  glm.hpp tbb.hpp)
 install(EXPORT prolate-query-targets NAMESPACE prolate::
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
 
@@ -13,14 +11,22 @@ if(PROLATE_BUILD_BUILDER)
     ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(EXPORT prolate-builder-targets NAMESPACE prolate::
     DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
-  list(APPEND prolate_headers mesh.hpp build.hpp verify.hpp eigen.hpp)
 endif()
 if(PROLATE_BUILD_CLI)
   install(TARGETS prolate_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(FILES ${PROJECT_BINARY_DIR}/self/prolate.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+  install(FILES ${PROJECT_BINARY_DIR}/self/bash RENAME prolate DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+  install(FILES ${PROJECT_BINARY_DIR}/self/zsh RENAME _prolate DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+  install(FILES ${PROJECT_BINARY_DIR}/self/fish RENAME prolate.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)
 endif()
 
-list(TRANSFORM prolate_headers PREPEND ${PROJECT_SOURCE_DIR}/include/prolate/)
-install(FILES ${prolate_headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/prolate)
+# All headers, but for the builder's where it is not built. eigen.hpp and tbb.hpp are for programs that have these.
+set(excluded_headers "")
+if(NOT PROLATE_BUILD_BUILDER)
+  set(excluded_headers REGEX "/(build|mesh|verify)\\.hpp$" EXCLUDE)
+endif()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/prolate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+  FILES_MATCHING PATTERN "*.hpp" ${excluded_headers})
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/prolate-config.cmake.in
   ${PROJECT_BINARY_DIR}/prolate-config.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)

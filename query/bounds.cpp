@@ -4,40 +4,11 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 
 namespace prolate::query {
-namespace {
 
 using glm::dvec3;
-
-constexpr uint32_t kMostNodes = 64;
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-
-struct Extent {
-    dvec3 lower{kInfinite}, upper{-kInfinite};
-    void add(const Extent& e) { lower = glm::min(lower, e.lower), upper = glm::max(upper, e.upper); }
-    void cut(const Extent& e) { lower = glm::max(lower, e.lower), upper = glm::min(upper, e.upper); }
-};
-
-Extent around(const dvec3& center, const dvec3& half, double slack) {
-    const dvec3 reach = half + slack;
-    return {center - reach, center + reach};
-}
-
-Extent extent(const PlacedEllipsoid& e, double margin, double rounding) {
-    const auto& l = e.factor; // columns
-    return around(e.center, glm::sqrt(l[0] * l[0] + l[1] * l[1] + l[2] * l[2]), margin + rounding * (e.reach + margin));
-}
-
-Bounds outward(const Extent& e) {
-    return {{round_down(e.lower.x), round_down(e.lower.y), round_down(e.lower.z)},
-            {round_up(e.upper.x), round_up(e.upper.y), round_up(e.upper.z)}};
-}
-
-} // namespace
 
 float round_down(double x) noexcept {
     return static_cast<float>(x - (0x1p-23 * std::abs(x) + 0x1p-149));
@@ -52,37 +23,21 @@ bool is_finite(const Bounds& box) noexcept {
 }
 
 LocalBounds local_bounds(const TreeView& tree) noexcept {
-    uint32_t level = 0;
-    while (level + 1 < tree.level_count() && tree.level(level + 1).node_count <= kMostNodes) ++level;
-    Extent box;
-    tree.for_each_in_cut(level, [&](uint32_t node) {
-        const PlacedEllipsoid e = place(tree.ellipsoid(node));
-        box.add(extent(e, 0, kSeparationMargin));
-    });
-    LocalBounds out{tree.root(), (box.lower + box.upper) * 0.5, (box.upper - box.lower) * 0.5, 0, 0};
+    const auto [to] = reach(tree, relative_pose({}, {}));
+    const dvec3 lower(-to[3], -to[4], -to[5]), upper(to[0], to[1], to[2]);
+    LocalBounds out{(lower + upper) * 0.5, (upper - lower) * 0.5, 0, 0};
     out.radius = glm::length(out.half), out.reach = glm::length(out.center) + out.radius;
     return out;
 }
 
-Bounds bounds_at(const LocalBounds& local, std::span<const Ellipsoid> level_1, const RelativePose& to_world,
-                 float margin, double rounding) noexcept {
-    const auto& r = to_world.rotation;
-    const Anchor turned = anchor(local, to_world);
-    const dvec3& h = local.half;
-    Extent out = around(turned.center, h.x * glm::abs(r[0]) + h.y * glm::abs(r[1]) + h.z * glm::abs(r[2]),
-                        margin + rounding * (turned.reach + margin));
-    out.cut(extent(place(local.root, to_world), margin, rounding));
-    Extent nodes;
-    for (const Ellipsoid& e : level_1) nodes.add(extent(place(e, to_world), margin, rounding));
-    if (!level_1.empty()) out.cut(nodes);
-    return outward(out);
-}
-
-Bounds bounds_at(const TreeView& tree, const LocalBounds& local, const RelativePose& to_world, float margin) noexcept {
-    std::array<Ellipsoid, kMaxDegree> level_1;
-    const ChildRange children = tree.children(0);
-    for (uint32_t i = 0; i < children.count; ++i) level_1[i] = tree.ellipsoid(children.first + i);
-    return bounds_at(local, std::span(level_1).first(children.count), to_world, margin);
+Bounds bounds_at(const TreeView& tree, const RelativePose& to_world, float margin, double tolerance,
+                 double rounding) noexcept {
+    if (!std::isfinite(to_world.distance)) return kEverything;
+    const auto [to] = reach(tree, to_world, tolerance, rounding);
+    const dvec3& t = to_world.translation;
+    const double pad = margin + rounding * (to_world.distance + margin);
+    return {{round_down(t.x - to[3] - pad), round_down(t.y - to[4] - pad), round_down(t.z - to[5] - pad)},
+            {round_up(t.x + to[0] + pad), round_up(t.y + to[1] + pad), round_up(t.z + to[2] + pad)}};
 }
 
 Anchor anchor(const LocalBounds& local, const RelativePose& to_world) noexcept {
@@ -104,8 +59,7 @@ double motion(const LocalBounds& local, const Anchor& from, const Anchor& to, do
 namespace prolate {
 
 Bounds bounds(const TreeView& tree, const Pose& pose, float margin) noexcept {
-    const auto to_world = query::relative_pose({}, pose);
-    const Bounds box = query::bounds_at(tree, query::local_bounds(tree), to_world, margin);
+    const Bounds box = query::bounds_at(tree, query::relative_pose({}, pose), margin < 0 ? 0 : margin);
     return query::is_finite(box) ? box : query::kEverything;
 }
 

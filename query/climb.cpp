@@ -27,15 +27,16 @@ public:
     uint32_t lanes(const std::byte* block) const {
         uint32_t out = 0xff;
         for (size_t i = 0; i < 3; ++i) {
-            const double box_step = power_of_two(load_le<uint8_t>(block + kBlockBoxExponent + i));
+            const double per_step = power_of_two(-int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)});
             const double x = at_[i] - load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
-            // Rounding is far below the slack, by which boxes may have been rounded, too.
-            const double above = std::floor((x + kSlack) / box_step), below = std::ceil((x - kSlack) / box_step);
+            // Box steps, the whole ones below and above: rounding is far below the slack.
+            const int32_t below = static_cast<int32_t>(std::clamp((x + kSlack) * per_step, -1.0, 255.0) + 1) - 1,
+                          above = 256 - static_cast<int32_t>(256 - std::clamp((x - kSlack) * per_step, 0.0, 256.0));
             uint32_t held = 0;
             for (size_t lane = 0; lane < kBlockLanes; ++lane) {
-                const auto low = load_le<uint8_t>(block + kBlockBoxLow + kBlockLanes * i + lane),
-                           high = load_le<uint8_t>(block + kBlockBoxHigh + kBlockLanes * i + lane);
-                held |= static_cast<uint32_t>(low <= above && high >= below) << lane;
+                const int32_t low = load_le<uint8_t>(block + kBlockBoxLow + kBlockLanes * i + lane),
+                              high = load_le<uint8_t>(block + kBlockBoxHigh + kBlockLanes * i + lane);
+                held |= static_cast<uint32_t>(low <= below && high >= above) << lane;
             }
             out &= held;
         }
@@ -55,6 +56,7 @@ double Hills::height(uint32_t vertex, const dvec3& up) const noexcept {
 
 // Calls visit(corners) for each triangle that has this vertex.
 template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) const {
+    if (tests_ > most_tests_) return;
     const BoxProbe probe(tree_.lattice(), tree_.vertex(vertex));
     struct Family {
         uint32_t first, left; // siblings from slot `first` on
@@ -88,31 +90,37 @@ template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) 
     }
 }
 
-Hills::Place Hills::climb(uint32_t vertex, const dvec3& up, double enough) const noexcept {
-    Place here{vertex, height(vertex, up)};
-    for (uint32_t step = 0; step < kClimbSteps && here.height <= enough && tests_ <= most_tests_; ++step) {
-        Place next = here;
-        triangles_at(here.vertex, [&](const Triangle& corners) {
-            for (const uint32_t v : corners) {
-                const double h = height(v, up); // equally high ones by their index, whatever the tree's order
-                if (h > next.height || (h == next.height && h > here.height && v < next.vertex)) next = {v, h};
-            }
-        });
-        if (next.vertex == here.vertex) break;
-        here = next;
-    }
-    return here;
+uint32_t Hills::step(uint32_t vertex, const dvec3& up) const noexcept {
+    const double from = height(vertex, up);
+    uint32_t top = vertex;
+    double most = from;
+    triangles_at(vertex, [&](const Triangle& corners) {
+        for (const uint32_t v : corners) {
+            if (v == vertex) continue;
+            const double h = height(v, up); // of equally high ones the first by index, whatever the tree's order
+            if (h > most || (h == most && h > from && v < top)) top = v, most = h;
+        }
+    });
+    return top;
 }
 
-Hills::Place Hills::climb_from_edge(uint32_t first, uint32_t second, const dvec3& up, double enough) const noexcept {
-    Place top{first, height(first, up)};
-    const double edge = std::max(top.height, height(second, up));
+uint32_t Hills::step(uint32_t first, uint32_t second, const dvec3& up) const noexcept {
+    uint32_t top = first;
+    double most = std::max(height(first, up), height(second, up));
     triangles_at(first, [&](const Triangle& corners) {
         if (std::ranges::find(corners, second) == corners.end()) return;
         for (const uint32_t v : corners)
-            if (v != first && v != second && height(v, up) > std::max(edge, top.height)) top = {v, height(v, up)};
+            if (v != first && v != second && height(v, up) > most) top = v, most = height(v, up);
     });
-    return top.vertex == first ? Place{first, edge} : climb(top.vertex, up, enough);
+    return top;
+}
+
+double Climb::step() noexcept {
+    const uint32_t from = vertex;
+    vertex = second != vertex ? hills->step(vertex, second, up) : hills->step(vertex, up);
+    second = vertex, --steps_left;
+    if (vertex == from) steps_left = 0;
+    return vertex == from ? 0 : hills->height(vertex, up) - hills->height(from, up);
 }
 
 } // namespace prolate::query

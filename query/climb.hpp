@@ -20,20 +20,16 @@ inline constexpr uint32_t kClimbSteps = 128;
 /// A tree with triangles, in its own frame.
 class Hills {
 public:
-    struct Place {
-        uint32_t vertex;
-        double height; ///< along the direction
-    };
-    /// `tests` counts nodes and triangles looked at; it climbs no further once they exceed `most_tests`.
+    /// `tests` counts nodes and triangles looked at; nothing rises any more once they exceed `most_tests`.
     Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests) noexcept
         : tree_(tree), tests_(tests), most_tests_(most_tests) {}
 
-    /// Climbs along `up` from a vertex; no further than to a height above `enough`.
-    Place climb(uint32_t vertex, const glm::dvec3& up, double enough) const noexcept;
-    /// From an edge on, all of which is equally high: the edge itself, if its triangles do not rise from it.
-    Place climb_from_edge(uint32_t first, uint32_t second, const glm::dvec3& up, double enough) const noexcept;
-
     double height(uint32_t vertex, const glm::dvec3& up) const noexcept;
+    /// The highest neighbour of a vertex along `up`, if it is higher than the vertex; else the vertex itself.
+    uint32_t step(uint32_t vertex, const glm::dvec3& up) const noexcept;
+    /// From an edge on, all of which is equally high: the highest third corner of its triangles, if that is higher than
+    /// the edge; else `first`.
+    uint32_t step(uint32_t first, uint32_t second, const glm::dvec3& up) const noexcept;
 
 private:
     template <class Visit> void triangles_at(uint32_t vertex, Visit&& visit) const;
@@ -41,6 +37,17 @@ private:
     const TreeView& tree_;
     uint64_t& tests_;
     const uint64_t most_tests_;
+};
+
+/// A climb, a step at a time.
+struct Climb {
+    const Hills* hills = nullptr;
+    glm::dvec3 up;                   ///< in the tree's frame
+    uint32_t vertex = 0, second = 0; ///< where it is: a vertex, or the edge between these
+    uint32_t steps_left = 0;         ///< 0: it is at its end
+
+    /// One step; returns by how much it rises.
+    double step() noexcept;
 };
 
 } // namespace prolate::query

@@ -112,7 +112,7 @@ struct Evaluation {
 };
 
 HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, const Limits& limits) {
-    Evaluation e;
+    Evaluation e{};
     e.mu = weights.mu, e.lambda = weights.lambda;
     const Symmetric q = p.combine(e.mu, e.lambda);
     e.adj = adjugate(q);

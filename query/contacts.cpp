@@ -1,14 +1,15 @@
 // Contact manifolds: all pairs of leaves that meet, as collide_all() finds them, each turned into points with a normal
 // (triangle_contact.hpp, gap.hpp), and all of these into a few manifolds (manifold.hpp).
 //
-// What a pair of triangles says for itself may be wrong: their edges may be internal ones of a flat surface, and a
-// small triangle that stands out of a face by little is parted soonest sideways. So the pairs are gone through twice.
-// The first time for the normals: those of faces make patches, others wait and count if no patch resolves them, that
-// is, unless they are parted once the bodies are moved along its normal as far as that patch needs anyway. Patches all
+// The pairs are gone through twice. The first time for the normals: of each pair that along which its surroundings
+// overlap least (triangle_contact.hpp), if that is less than what a patch found before needs to resolve it, that is, to
+// have it parted once the bodies are moved along the patch's normal. Normals of faces make patches, others wait and
+// count if no patch resolves them that is no deeper. Then the deepest vertices of each patch are found, and patches all
 // of which another one resolves are dropped. The second time for the points: of each pair along the normal of the first
 // patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
 //
-// Complexity: twice collide_all()'s, and some microseconds for each pair that meets.
+// Complexity: twice collide_all()'s, and some microseconds for each pair that meets; for each patch up to 18 climbs and
+// rays.
 #include "query/climb.hpp"
 #include "query/convert.hpp"
 #include "query/descent.hpp"
@@ -39,7 +40,10 @@ constexpr double kTolerance = 1e-7;    // of the smaller ellipsoid: how exact de
 constexpr double kSamePoint = 1e-4;    // of the smaller body: what is nearer is one point
 constexpr double kSameFace = 0.9;      // cosine: a face turned farther from a normal has no points along it
 constexpr double kSameAsFace = 0.9999; // cosine: a normal that is the face's
-constexpr double kSameNormal = 0.8;    // cosine: normals of a point in two queries, if it is the same
+constexpr double kSlack = 0.25;        // of a depth: the normals of curved bodies are means, and no exact ones
+constexpr double kFirstTilt = 0.1, kLeastTilt = 1e-3; // radians, about: steps of the search for the shortest way
+constexpr int kTiltRounds = 8;
+constexpr double kSameNormal = 0.8; // cosine: normals of a point in two queries, if it is the same
 
 // The finisher of SplitMix64 (Steele, Lea, Flood 2014).
 uint64_t mixed(uint64_t x) {
@@ -79,6 +83,10 @@ struct Contact {
     double overlap; // of the bodies around the pair
 };
 
+dvec3 perpendicular(const dvec3& n) {
+    return glm::normalize(glm::cross(n, std::abs(n.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)));
+}
+
 class Collector {
 public:
     Collector(Descent& descent, QueryContext& context, bool swapped, const ContactManifolds& last,
@@ -100,24 +108,33 @@ public:
     // Between the two passes: settles the normals and depths.
     void settle() {
         flush();
-        const Patch* found[kManifolds];
-        const uint32_t count = patches_.sorted(found);
-        Way ways[kManifolds];
-        Patch deepest[kManifolds];
-        bool needed[kManifolds] = {};
-        for (uint32_t i = 0; i < count; ++i) {
-            ways[i] = {found[i]->normal(), found[i]->depth()}, deepest[i] = Patch(ways[i].normal), needed[i] = true;
-            add_deepest(*found[i], deepest[i]);
-            ways[i].depth = std::max(ways[i].depth, deepest[i].depth());
-        }
+        struct Group {
+            const Patch* patch;
+            Way way;
+            Patch deepest;
+        };
+        Group groups[Patches::kMost];
+        uint32_t count = 0;
+        patches_.for_each([&](const Patch& p) {
+            const dvec3 n = shortest_way(p);
+            Group group{&p, {n, p.depth()}, Patch(n)};
+            add_deepest(p, n, group.deepest);
+            group.way.depth = std::max(group.way.depth, group.deepest.depth());
+            uint32_t at = count++; // the deepest first
+            for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];
+            groups[at] = group;
+        });
+        bool needed[Patches::kMost];
+        std::fill_n(needed, count, true);
         for (uint32_t i = 0; i < count; ++i)
             for (uint32_t j = 0; j < count && needed[i]; ++j)
                 if (j != i && needed[j])
-                    needed[i] = !std::all_of(found[i]->begin(), found[i]->end(), [&](const Candidate& c) {
-                        return resolves(ways[j].normal, ways[j].depth, c.pair);
+                    needed[i] = !std::all_of(groups[i].patch->begin(), groups[i].patch->end(), [&](const Candidate& c) {
+                        return resolves(groups[j].way.normal,
+                                        groups[j].way.depth + kSlack * std::abs(groups[j].way.depth), c.pair);
                     });
-        for (uint32_t i = 0; i < count; ++i)
-            if (needed[i]) way_[ways_] = ways[i], points_[ways_] = deepest[i], ++ways_;
+        for (uint32_t i = 0; i < count && ways_ < kManifolds; ++i)
+            if (needed[i]) way_[ways_] = groups[i].way, points_[ways_] = groups[i].deepest, ++ways_;
         settled_ = true;
     }
     // After both: patches with points, at least one if any pair met.
@@ -144,12 +161,14 @@ private:
     void add(const MeetingPair& pair) {
         if (!settled_) {
             if (d_.found == 0) first_ = pair;
-            double limit = HUGE_VAL;
+            KnownOverlap known;
             patches_.for_each([&](const Patch& p) {
-                if (resolves(p.normal(), p.overlap(), pair)) limit = std::min(limit, p.overlap());
+                if (p.overlap() < known.overlap && resolves(p.normal(), p.overlap(), pair))
+                    known = {p.normal(), p.overlap()};
             });
-            return own(pair, limit, [&](const Contact& c, bool certain) {
-                if (certain) return take(c);
+            return own(pair, known, [&](const Contact& c, bool certain) {
+                // What is no better than what resolves it gives points, not a direction.
+                if (certain) return take(c, c.overlap <= known.overlap + patches_.apart());
                 if (waiting_count_ == kWaiting) flush();
                 waiting_[waiting_count_++] = c;
             });
@@ -157,7 +176,7 @@ private:
         if (pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle)
             for (uint32_t i = 0; i < ways_; ++i)
                 if (resolves(way_[i].normal, way_[i].depth, pair) && along(way_[i].normal, pair, points_[i])) return;
-        own(pair, HUGE_VAL, [&](const Contact& c, bool) {
+        own(pair, {}, [&](const Contact& c, bool) {
             for (uint32_t i = 0; i < ways_; ++i)
                 if (points_[i].takes(c.normal))
                     return points_[i].add(c.normal, candidate(c), 0, c.overlap, patches_.apart());
@@ -234,13 +253,13 @@ private:
         }
     }
 
-    // ---- what a pair says for itself: use(contact, certain), if it overlaps by less than `limit` ----
+    // ---- what a pair says for itself: use(contact, certain), if it is not much longer than the known way ----
 
-    template <class Use> void own(const MeetingPair& pair, double limit, Use&& use) const {
+    template <class Use> void own(const MeetingPair& pair, const KnownOverlap& known, Use&& use) const {
         const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
         if (in_a && in_b) {
-            const TriangleContact found = contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b),
-                                                  d_.options.margin, limit);
+            const TriangleContact found =
+                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), d_.options.margin, known);
             return for_each_point(found, pair, [&](const Contact& c) { use(c, found.faces); });
         }
         if (in_a) return own_mixed(pair, surrounded_a(pair.triangle_a), ellipsoid_b(pair), 1, use);
@@ -278,7 +297,8 @@ private:
             if (!(size > 0)) return;
             const dvec3 n = v / size, w = n * e.factor;
             double depth = highest(t, n) - (glm::dot(n, e.center) - glm::length(w));
-            if (depth < least && !of_face) depth += around.rise(around.highest(n), n, least - depth);
+            Climb climb = around.climb(around.highest(n), n);
+            while (!of_face && depth < least && climb.steps_left > 0) depth += climb.step();
             if (depth < least) least = depth, best = n, deepest = e.center - e.factor * (w / glm::length(w));
         };
         consider(face, true);
@@ -292,23 +312,83 @@ private:
         }
         hand_on(best, deepest + 0.5 * least * best, least);
     }
+    // ---- the way out of curved bodies ----
+
+    // What the bodies overlap by along n around two of their vertices, which it moves to the tops of their climbs; what
+    // is above `enough` may be too little.
+    double overlap(const dvec3& n, uint32_t& vertex_a, uint32_t& vertex_b, double enough) const {
+        Climb a{&hills_a_, n, vertex_a, vertex_a, kClimbSteps},
+            b{&hills_b_, -(n * d_.b_to_a.rotation), vertex_b, vertex_b, kClimbSteps};
+        const dvec3 at_a = to_double(d_.a.tree.vertex(vertex_a)),
+                    at_b = d_.b_to_a.rotation * to_double(d_.b.tree.vertex(vertex_b)) + d_.b_to_a.translation;
+        double sum = glm::dot(n, at_a - at_b);
+        while (sum <= enough && a.steps_left > 0) sum += a.step();
+        while (sum <= enough && b.steps_left > 0) sum += b.step();
+        vertex_a = a.vertex, vertex_b = b.vertex;
+        return sum;
+    }
+
+    // The normal of a patch. Finely meshed curved bodies have as many normals as triangles that meet, all around the
+    // place where they are deepest: from their mean on, the direction is turned to where they overlap least, by the
+    // parabolas through the overlaps of a pattern of directions (Hooke and Jeeves 1961, with the step of Powell 1964).
+    dvec3 shortest_way(const Patch& patch) const {
+        const dvec3 mean = patch.normal();
+        const MeetingPair& pair = patch.begin()->pair;
+        if (!patch.mixed() || pair.triangle_a == kNoTriangle || pair.triangle_b == kNoTriangle) return mean;
+        const Surrounded a = surrounded_a(pair.triangle_a), b = surrounded_b(pair.triangle_b);
+        dvec3 best = mean;
+        uint32_t vertex_a = a.corners[a.highest(best)], vertex_b = b.corners[b.highest(-best)];
+        const double most = patch.overlap() + patches_.apart();
+        double least = overlap(best, vertex_a, vertex_b, most);
+        if (!(least <= most)) return mean; // around here the bodies are not convex
+        double tilt = kFirstTilt;
+        for (int round = 0; round < kTiltRounds && tilt > kLeastTilt; ++round) {
+            const dvec3 center = best, x = perpendicular(center), y = glm::cross(center, x);
+            const double here = least;
+            const auto look = [&](double along_x, double along_y) {
+                const dvec3 n = glm::normalize(center + along_x * x + along_y * y);
+                uint32_t of_a = vertex_a, of_b = vertex_b;
+                const double found = overlap(n, of_a, of_b, 4 * std::abs(here) + patches_.apart());
+                if (found < least && glm::dot(n, mean) > kSameFace)
+                    best = n, least = found, vertex_a = of_a, vertex_b = of_b;
+                return found;
+            };
+            const auto lowest = [&](double before, double after) { // of the parabola
+                const double bend = before + after - 2 * here;
+                return bend > 0 ? std::clamp(tilt * (before - after) / (2 * bend), -tilt, tilt) : 0;
+            };
+            const double left = look(-tilt, 0), right = look(tilt, 0), below = look(0, -tilt), above = look(0, tilt);
+            look(lowest(left, right), lowest(below, above));
+            if (glm::dot(best, center) > 1 - tilt * tilt / 8) tilt /= 4; // moved by less than half of it
+        }
+        return best;
+    }
     // ---- the deepest points ----
 
     // What of a finely meshed body is deepest in the other meets no triangle. From the pairs of a patch the bodies are
     // climbed along its normal to what is deepest around there, and a ray from it finds the other body's surface.
-    void add_deepest(const Patch& from, Patch& to) {
-        const dvec3 n = from.normal();
-        for (const Candidate& c : from) {
-            if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
-            add_deepest(c.pair, n, from.overlap(), true, to);
-            add_deepest(c.pair, n, from.overlap(), false, to);
+    void add_deepest(const Patch& from, const dvec3& n, Patch& to) {
+        for (const bool of_a : {true, false}) {
+            uint32_t seen[2 * Patch::kSieve], count = 0; // vertices
+            const auto look = [&](const MeetingPair& pair, const dvec3& along) {
+                const Surrounded around = of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b);
+                const dvec3 up = of_a ? along : -along; // out of the body
+                Climb climb = around.climb(around.highest(up), up);
+                while (climb.steps_left > 0) climb.step();
+                if (std::find(seen, seen + count, climb.vertex) != seen + count) return;
+                seen[count++] = climb.vertex;
+                add_deepest(pair, climb.vertex, n, from.overlap(), of_a, to);
+            };
+            for (const Candidate& c : from) {
+                if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
+                look(c.pair, n);
+                if (!(glm::dot(c.normal, n) > kSameAsFace)) look(c.pair, c.normal); // in a hollow of faces
+            }
         }
     }
     // A vertex of the one body that lies in the other, its place in A's frame.
-    void add_deepest(const MeetingPair& pair, const dvec3& n, double most, bool of_a, Patch& to) {
-        const dvec3 up = of_a ? n : -n; // out of the body
-        const uint32_t vertex =
-            (of_a ? surrounded_a(pair.triangle_a) : surrounded_b(pair.triangle_b)).top(up).vertex;
+    void add_deepest(const MeetingPair& pair, uint32_t vertex, const dvec3& n, double most, bool of_a, Patch& to) {
+        const dvec3 up = of_a ? n : -n;
         const dvec3 here = to_double((of_a ? d_.a : d_.b).tree.vertex(vertex));
         const dvec3 at = of_a ? here : d_.b_to_a.rotation * here + d_.b_to_a.translation;
         // Cast in the other body's frame, against `up`.
@@ -344,7 +424,7 @@ private:
                     whole(first_.node_b, first_.triangle_b),
                     0};
         bool any = false;
-        own(first_, HUGE_VAL, [&](const Contact& c, bool) {
+        own(first_, {}, [&](const Contact& c, bool) {
             if (!any) out = c, any = true;
         });
         if (any) return out;
@@ -354,7 +434,7 @@ private:
     }
 
     Candidate candidate(const Contact& c) const {
-        Candidate out{c.middle, c.depth, swapped_ ? id_of(c.b, c.a) : id_of(c.a, c.b), false, c.pair};
+        Candidate out{c.middle, c.depth, swapped_ ? id_of(c.b, c.a) : id_of(c.a, c.b), false, c.normal, c.pair};
         for (uint32_t i = 0; i < std::min(last_.count, kManifolds); ++i) {
             const Manifold& m = last_.manifolds[i];
             const bool alike = glm::dot(last_normals_[i], c.normal) > kSameNormal;
@@ -363,9 +443,9 @@ private:
         }
         return out;
     }
-    void take(const Contact& c) {
-        const double weight = std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_;
-        patches_.add(c.normal, candidate(c), weight, c.overlap);
+    void take(const Contact& c, bool with_normal) {
+        const double weight = with_normal ? std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_ : 0;
+        patches_.add(c.normal, candidate(c), weight, with_normal ? c.overlap : -HUGE_VAL);
     }
     // What waits counts if no patch resolves it, or only one that is deeper than the pair.
     void flush() {
@@ -376,7 +456,7 @@ private:
                 resolved = resolved || (resolves(p.normal(), p.overlap(), c.pair) &&
                                         (c.overlap < 0 || p.overlap() <= c.overlap + patches_.apart()));
             });
-            if (!resolved) take(c);
+            if (!resolved) take(c, true);
         }
         waiting_count_ = 0;
     }
@@ -445,6 +525,7 @@ ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactMan
     out.found = descent.found;
     descent.stats.deepest_level = std::max(descent.a.deepest_level(), descent.b.deepest_level());
     out.stats = descent.stats;
+    out.stats.triangle_tests += descent.other_tests;
     if (!std::isfinite(descent.b_to_a.distance)) return out; // no place for points
 
     if (descent.found > 0) {

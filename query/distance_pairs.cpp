@@ -165,7 +165,7 @@ PairStats distance_pairs(const EllipsoidBodies& bodies, std::span<const IndexPai
         uint32_t left = (1u << count) - 1;
         for (uint32_t done = 0; left != 0 && done < kMaxDistanceEvaluations; ++done) {
             stats.evaluations += static_cast<uint32_t>(std::popcount(left));
-            Answer answer;
+            Answer answer{};
             uint32_t finished = left & bits(lanes.evaluate(answer));
             if (finished == 0) continue;
             left &= ~finished;

@@ -10,7 +10,8 @@
 // that a perfect direction would separate; the descent goes on for those.
 //
 // Why single precision suffices. Everything is in the lattice coordinates of the block's tree, where its centers c2 are
-// integers below 2^16 and L2 = integers * 2^k: both exact. u = 2^-24, norms Euclidean or Frobenius.
+// integers below 2^16, and L2 is what the format says it is, a float each: both exact. u = 2^-24, norms Euclidean or
+// Frobenius.
 //   c1      computed in double (within 2^-44 reach, LatticePose), rounded once:      |dc1| <= u |c1| + 2^-44 reach
 //   r       one subtraction:                                                         |dr|  <= |dc1| + u |r|
 //   L1      rounded rotation (u) times exact factor, 3 products and 2 sums:          |dL1| <= 4 sqrt(3) u |L1|
@@ -25,9 +26,9 @@
 // the factor form has no cancellation (the shape-matrix form n^T Q n, cheaper, does, and separates needles that
 // overlap).
 //
-// Underflow: entries of Q are at most 1; a square below 2^-126 loses digits, which costs a and b at most 2^-74 each,
-// far below the margin (at least 32 u 65535 |n|_1 > 0.1 |n|_1) if |n|_1 > 2^-60, which is demanded. Overflow, and NaN
-// from whatever source, fail the comparison and so never separate.
+// Underflow: no entry of L2 is below 2^-60 (kMinNodeSize) but for 0. Entries of Q are at most 1; a square below 2^-126
+// loses digits, which costs a and b at most 2^-74 each, far below the margin (at least 32 u 65535 |n|_1 > 0.1 |n|_1) if
+// |n|_1 > 2^-60, which is demanded. Overflow, and NaN from whatever source, fail the comparison and so never separate.
 //
 // Cost: about 140 vector operations and two square roots for eight pairs.
 #include "query/lanes.hpp"
@@ -64,6 +65,9 @@ struct LaneNodes {
     Lanes l11, l21, l22, l31, l32, l33;
 };
 
+static_assert(HWY_TARGET == HWY_SCALAR || std::endian::native == std::endian::little,
+              "vectors take the file's little-endian numbers as they stand: disable this target in query/targets.hpp");
+
 // 16-bit integers at any address, as floats.
 template <class T> HWY_INLINE Lanes load_integers(const std::byte* from) {
     const hn::Rebind<T, LaneTag> d16;
@@ -85,21 +89,22 @@ HWY_INLINE LaneNodes load_nodes(const std::byte* block, size_t first, int32_t st
     };
     const auto stored =
         hn::PromoteTo(d32, hn::LoadU(d8, reinterpret_cast<const int8_t*>(block + kBlockExponent + first)));
-    const auto exponent =
-        hn::Min(hn::Max(hn::Sub(stored, hn::Set(d32, 16 + step_exponent)), hn::Set(d32, kLowestExponent)),
-                hn::Set(d32, kHighestExponent));
-    const Lanes one = hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(exponent, hn::Set(d32, 127))));
-    const Lanes two = hn::Add(one, one); // off-diagonal integers count twice as much
-    LaneNodes out;
+    const Lanes unit =
+        hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(stored, hn::Set(d32, kFactorBias - step_exponent)))); // factor_unit()
+    const auto diagonal = [&](size_t row) {
+        const Lanes q = load_integers<uint16_t>(at(kBlockDiagonal, row));
+        return hn::Mul(hn::Mul(q, unit), q);
+    };
+    const auto off_diagonal = [&](size_t row) {
+        const Lanes q = load_integers<int16_t>(at(kBlockOffDiagonal, row));
+        return hn::Mul(hn::Mul(q, unit), hn::Abs(q));
+    };
+    LaneNodes out{};
     out.x = load_integers<uint16_t>(at(kBlockCenter, 0));
     out.y = load_integers<uint16_t>(at(kBlockCenter, 1));
     out.z = load_integers<uint16_t>(at(kBlockCenter, 2));
-    out.l11 = hn::Mul(load_integers<uint16_t>(at(kBlockDiagonal, 0)), one);
-    out.l22 = hn::Mul(load_integers<uint16_t>(at(kBlockDiagonal, 1)), one);
-    out.l33 = hn::Mul(load_integers<uint16_t>(at(kBlockDiagonal, 2)), one);
-    out.l21 = hn::Mul(load_integers<int16_t>(at(kBlockOffDiagonal, 0)), two);
-    out.l31 = hn::Mul(load_integers<int16_t>(at(kBlockOffDiagonal, 1)), two);
-    out.l32 = hn::Mul(load_integers<int16_t>(at(kBlockOffDiagonal, 2)), two);
+    out.l11 = diagonal(0), out.l22 = diagonal(1), out.l33 = diagonal(2);
+    out.l21 = off_diagonal(0), out.l31 = off_diagonal(1), out.l32 = off_diagonal(2);
     return out;
 }
 
@@ -121,20 +126,19 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
     const hn::FixedTag<int32_t, 4> d32;
     const hn::FixedTag<uint8_t, 16> d8;
     // The node as stored, each number of the factor in all four components.
-    const int32_t exponent = load_le<int8_t>(block + kBlockExponent + lane) - (16 + pose.exponent_from);
-    const auto one =
-        hn::Set(d, std::bit_cast<float>((std::clamp(exponent, kLowestExponent, kHighestExponent) + 127) << 23));
-    const auto two = hn::Add(one, one); // off-diagonal integers count twice as much
+    const auto unit = hn::Set(d, factor_unit(load_le<int8_t>(block + kBlockExponent + lane), pose.exponent_from));
     const auto diagonal = [&](size_t row) {
         const auto twice =
             hn::Set(hn::FixedTag<uint16_t, 8>(), load_le<uint16_t>(block + block_offset(kBlockDiagonal, row, lane)));
         const auto stored = hn::ShiftRight<16>(hn::BitCast(hn::FixedTag<uint32_t, 4>(), twice));
-        return hn::Mul(hn::ConvertTo(d, hn::BitCast(d32, stored)), one);
+        const auto q = hn::ConvertTo(d, hn::BitCast(d32, stored));
+        return hn::Mul(hn::Mul(q, unit), q);
     };
     const auto off_diagonal = [&](size_t row) {
         const auto twice =
             hn::Set(hn::FixedTag<int16_t, 8>(), load_le<int16_t>(block + block_offset(kBlockOffDiagonal, row, lane)));
-        return hn::Mul(hn::ConvertTo(d, hn::ShiftRight<16>(hn::BitCast(d32, twice))), two);
+        const auto q = hn::ConvertTo(d, hn::ShiftRight<16>(hn::BitCast(d32, twice)));
+        return hn::Mul(hn::Mul(q, unit), hn::Abs(q));
     };
     const auto l21 = off_diagonal(0), l31 = off_diagonal(1), l32 = off_diagonal(2);
     const auto coordinate = [&](size_t row) {
@@ -145,8 +149,8 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
 
     Single s;
     const hn::CappedTag<double, 4> d64;
-    const auto x = hn::Set(d64, double{stored_x}), y = hn::Set(d64, double{stored_y}),
-               z = hn::Set(d64, double{stored_z});
+    const auto wide = [d64](int32_t stored) { return hn::Set(d64, static_cast<double>(stored)); };
+    const auto x = wide(stored_x), y = wide(stored_y), z = wide(stored_z);
     for (size_t i = 0; i < 4; i += hn::Lanes(d64)) {
         const auto column = [&](size_t c) { return hn::Load(d64, pose.linear[c] + i); };
         const auto exact = hn::Add(hn::Add(hn::Mul(column(0), x), hn::Mul(column(1), y)),
@@ -279,7 +283,7 @@ struct LaneShapes {
     Lanes size;
 };
 HWY_INLINE LaneShapes shapes_of(const LaneNodes& e) {
-    LaneShapes q;
+    LaneShapes q{};
     q.xx = hn::Mul(e.l11, e.l11), q.xy = hn::Mul(e.l21, e.l11), q.xz = hn::Mul(e.l31, e.l11);
     q.yy = hn::Add(hn::Mul(e.l21, e.l21), hn::Mul(e.l22, e.l22));
     q.yz = hn::Add(hn::Mul(e.l31, e.l21), hn::Mul(e.l32, e.l22));
@@ -357,7 +361,7 @@ HWY_INLINE LaneTerms evaluate(const LaneNodes& e, const Single& s) {
     const LaneShapes q = shapes_of(e);
     const Lanes w2 = hn::Div(set(1), hn::Mul(q.size, hn::Add(q.size, set(s.size)))); // the trace of Q1 / |L1| is |L1|
     const LaneVector r = between(e, s), n = adjugate_times(mixed(q, hn::Mul(q.size, w2), w2, s), r);
-    LaneTerms t;
+    LaneTerms t{};
     t.x = n.x, t.y = n.y, t.z = n.z;
     t.size = q.size;
     t.in_a = transposed_times(s, n), t.in_b = transposed_times(e, n);

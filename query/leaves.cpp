@@ -55,7 +55,7 @@ bool Descent::spend(uint64_t tests) noexcept {
 
 bool Descent::take(const MeetingPair& pair) noexcept {
     if (each != nullptr) each(each_user, pair);
-    if (found < pairs.size()) pairs[found] = pair;
+    if (found < pairs.size()) pairs[static_cast<size_t>(found)] = pair;
     ++found;
     return !all;
 }

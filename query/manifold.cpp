@@ -10,7 +10,8 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kSameNormal = 0.9; // cosine
+constexpr double kSameNormal = 0.9;    // cosine
+constexpr double kAgreeing = 1 - 1e-6; // of the weights: a mean that is as long is one of the same normals
 constexpr double kPreferKnown = 1.1;
 constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
 
@@ -33,7 +34,7 @@ bool Patch::takes(const dvec3& normal) const noexcept {
 }
 
 void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap, double apart) noexcept {
-    sum_ += weight * normal;
+    sum_ += weight * normal, weight_ += weight;
     overlap_ = std::max(overlap_, overlap);
     const double x = glm::dot(x_, candidate.middle), y = glm::dot(y_, candidate.middle);
     constexpr double kDiagonal = 0.7071067811865476;
@@ -51,6 +52,10 @@ void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, 
 dvec3 Patch::normal() const noexcept {
     const double length = glm::length(sum_);
     return length > 0 ? sum_ / length : seed_;
+}
+
+bool Patch::mixed() const noexcept {
+    return glm::length(sum_) < kAgreeing * weight_;
 }
 
 uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept {
@@ -71,9 +76,7 @@ uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const no
     dvec3 mean(0);
     for (const Candidate& c : sieve_) mean += c.middle / double{kSieve};
     const double as_deep = sieve_[0].depth - std::min(apart, kSameDepth * std::abs(sieve_[0].depth));
-    const auto outermost = [&](const Candidate& c) {
-        return c.depth >= as_deep ? glm::length(c.middle - mean) : -1;
-    };
+    const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
     if (!take(-0.5, outermost)) out[count++] = sieve_[0];
     const dvec3 p = out[0].middle;
     if (!take(apart, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
@@ -99,23 +102,12 @@ void Patches::add(const dvec3& normal, const Candidate& candidate, double weight
         if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, apart_);
         if (patches_[i].depth() < shallowest->depth()) shallowest = &patches_[i];
     }
-    if (count_ < kManifolds)
+    if (count_ < kMost)
         shallowest = &patches_[count_++];
     else if (!(candidate.depth > shallowest->depth()))
         return;
     *shallowest = Patch(normal);
     shallowest->add(normal, candidate, weight, overlap, apart_);
-}
-
-uint32_t Patches::sorted(const Patch* (&out)[kManifolds]) const noexcept {
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < count_; ++i)
-        if (!patches_[i].empty()) {
-            uint32_t at = count++;
-            for (; at > 0 && patches_[i].depth() > out[at - 1]->depth(); --at) out[at] = out[at - 1];
-            out[at] = &patches_[i];
-        }
-    return count;
 }
 
 } // namespace prolate::query

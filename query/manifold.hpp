@@ -21,13 +21,16 @@ struct Candidate {
     glm::dvec3 middle{0, 0, 0}; // between the surfaces
     double depth = 0;
     uint64_t id = 0;
-    bool known = false; // of the last query
+    bool known = false;         // of the last query
+    glm::dvec3 normal{0, 0, 1}; // of the pair
     MeetingPair pair;
 };
 
 /// Points of about one normal.
 class Patch {
 public:
+    static constexpr uint32_t kSieve = 9; ///< the deepest; the farthest in eight directions
+
     explicit Patch(const glm::dvec3& normal) noexcept;
     Patch() = default;
 
@@ -37,35 +40,37 @@ public:
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
              double apart) noexcept;
     bool empty() const noexcept { return !any_; }
-    double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; }   ///< of the deepest point
-    double overlap() const noexcept { return overlap_; } ///< the largest
+    double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; } ///< of the deepest point
+    double overlap() const noexcept { return overlap_; }                      ///< the largest
     const Candidate* begin() const noexcept { return sieve_; } ///< those that stand for all, if there are any
     const Candidate* end() const noexcept { return sieve_ + kSieve; }
-    glm::dvec3 normal() const noexcept;
+    glm::dvec3 normal() const noexcept; ///< the mean
+    /// Is the mean one of different normals?
+    bool mixed() const noexcept;
     /// The best four or fewer. Returns how many.
     uint32_t reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept;
 
 private:
-    static constexpr uint32_t kSieve = 9; // the deepest; the farthest in eight directions
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
+    double weight_ = 0;
     Candidate sieve_[kSieve];
     double reach_[kSieve]; // what each is the best for: depth, or coordinate
     double overlap_ = -1e300;
     bool any_ = false;
 };
 
-/// Sorts points into patches by their normals.
+/// Sorts points into patches by their normals: the deepest of them, if there are more.
 class Patches {
 public:
+    static constexpr uint32_t kMost = 8;
+
     explicit Patches(double apart) : apart_(apart) {}
     /// A patch for points of about this normal, if some come.
     void expect(const glm::dvec3& normal) noexcept {
-        if (count_ < kManifolds) patches_[count_++] = Patch(normal);
+        if (count_ < kMost) patches_[count_++] = Patch(normal);
     }
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept;
     double apart() const noexcept { return apart_; }
-    /// Those that have points, the deepest first. Returns how many.
-    uint32_t sorted(const Patch* (&out)[kManifolds]) const noexcept;
     /// Calls visit(patch) for those that have points.
     template <class Visit> void for_each(Visit&& visit) const {
         for (uint32_t i = 0; i < count_; ++i)
@@ -74,7 +79,7 @@ public:
 
 private:
     double apart_;
-    Patch patches_[kManifolds];
+    Patch patches_[kMost];
     uint32_t count_ = 0;
 };
 

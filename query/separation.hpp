@@ -30,8 +30,8 @@
 // |dn| <= 570 u S, |d det| <= 653 u, |da| <= 651 u S |L|. It is tightened by kOverlapMargin, 1024 u, times the same.
 //
 // Cost: about 150 flops an evaluation; random pairs take 1.1 evaluations, pairs near contact 3.
-// Limits: axis ratios beyond 10^4 in both bodies: adj(Q) has then lost so many digits that pairs close to contact stay
-// unresolved.
+// Limits: at axis ratios far beyond 10^4 in both bodies adj(Q) loses so many digits that pairs close to contact stay
+// unresolved. Up to 16384, the most that bakes make, the tests find none.
 #pragma once
 
 #include <prolate/types.hpp>
@@ -73,7 +73,7 @@ PlacedEllipsoid place(const Ellipsoid& e, const RelativePose& b_to_a) noexcept; 
 
 /// `unresolved`: no plane found, and the overlap not certified either (contact within rounding, or nearly parallel
 /// needles, whose det(Q) has lost its digits). Callers treat it as overlapping. In the tests' million pairs, of axis
-/// ratios up to 1000, no pair with a relative gap above 1e-9 ends here.
+/// ratios up to 16384, no pair with a relative gap above 1e-9 ends here.
 enum class PairVerdict : uint8_t { separated, overlapping, unresolved };
 struct PairResult {
     PairVerdict verdict;

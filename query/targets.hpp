@@ -4,6 +4,10 @@
 // x86: SSE4, AVX2 and AVX-512 (HWY_AVX3). SSSE3 and the Ice Lake set would double what is compiled and win nothing
 // here; Highway 1.0 has no target for SSE2 alone, so machines before SSE4.2 (2008) run its scalar one. Vectors whose
 // length is not known when compiling (SVE, RVV) cannot lie in arrays as our 8 lanes do; ARM then has NEON.
+//
+// In kernels, structs of vectors begin with braces, `LaneNodes out{}`: GCC compiles the constructor that it makes up
+// for `LaneNodes out` without the kernel's instruction set, and then may not inline what Highway's NEON vectors do in
+// it.
 #pragma once
 
 // Expanded by Highway's own headers, which define the names.

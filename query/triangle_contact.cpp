@@ -14,12 +14,14 @@ namespace {
 using glm::dvec3;
 using Corners = dvec3[3];
 
-constexpr double kEdgeBias = 0.05; // an edge's product must overlap by this share less than a face does
-constexpr double kParallel = 1e-8; // sine of an angle: edges that are nearer to parallel have no product
-constexpr double kFlat = 1e-9;     // of the triangles' size: what counts as touching
-constexpr double kCrossing = 1e-6; // of the triangles' size: what edges may miss each other by
-constexpr double kFacing = 0.9;    // cosine: a face turned farther from a normal is not cut along it
-constexpr double kAskance = 0.3;   // cosine: a face that looks this much the same way as the normal is not in contact
+constexpr double kEdgeBias = 0.05;           // an edge's product must overlap by this share less than a face does
+constexpr double kParallel = 1e-8;           // sine of an angle: edges that are nearer to parallel have no product
+constexpr double kFlat = 1e-9;               // of the triangles' size: what counts as touching
+constexpr double kCrossing = 1e-6;           // of the triangles' size: what edges may miss each other by
+constexpr double kFacing = 0.9;              // cosine: a face turned farther from a normal is not cut along it
+constexpr double kNoLonger = 0.25;           // share by which ways out may be longer than a known one
+constexpr double kSameDirection = 1 - 1e-10; // cosine: normals that are the same but for rounding
+constexpr double kAskance = 0.3; // cosine: a face that looks this much the same way as the normal is not in contact
 
 struct Axis {
     enum class Kind : uint8_t { none, face_a, face_b, edges };
@@ -27,16 +29,12 @@ struct Axis {
     dvec3 normal{0, 0, 1};
     double overlap = 0; // of the triangles; of edges with what they must win by
     Feature edge_a = 0, edge_b = 0;
+    Climb climb_a{}, climb_b{};
 };
 
 dvec3 unit_or_zero(const dvec3& v) {
     const double length = glm::length(v);
     return length > 0 ? v / length : dvec3(0);
-}
-
-Feature highest_corner(const Corners& corners, const dvec3& up) {
-    const double h[3] = {glm::dot(up, corners[0]), glm::dot(up, corners[1]), glm::dot(up, corners[2])};
-    return static_cast<Feature>(std::max_element(h, h + 3) - h);
 }
 
 class Axes {
@@ -50,8 +48,8 @@ public:
     // May B be pushed along n?
     bool leads_out(const dvec3& n) const { return glm::dot(n, out_a_) >= -kAskance && glm::dot(n, out_b_) <= kAskance; }
 
-    // That along which the surroundings overlap least, if by less than `limit`; Axis::overlap is theirs.
-    Axis least_overlap(const Surrounded& a, const Surrounded& b, double limit) {
+    // That along which the surroundings overlap least; Axis::overlap is theirs.
+    Axis least_overlap(const Surrounded& a, const Surrounded& b, const KnownOverlap& known) {
         for (const double sign : {1.0, -1.0}) {
             face(Axis::Kind::face_a, sign * unit_or_zero(pair_.normal_a));
             face(Axis::Kind::face_b, sign * unit_or_zero(pair_.normal_b));
@@ -59,32 +57,34 @@ public:
         for (size_t i = 0; i < 3; ++i)
             for (size_t j = 0; j < 3; ++j)
                 for (const double sign : {1.0, -1.0}) edges(i, j, sign);
-        Axis best;
-        for (uint32_t left = count_; left > 0; --left) { // the least first: they can only grow
-            Axis* const next = std::min_element(axes_, axes_ + left, [](const Axis& x, const Axis& y) {
-                return x.overlap < y.overlap;
-            });
-            if (!(next->overlap < limit)) break;
-            const double overlap = next->overlap + rise(*next, a, b, limit - next->overlap);
-            if (overlap < limit) best = *next, best.overlap = limit = overlap;
-            *next = axes_[left - 1];
+        for (uint32_t i = 0; i < count_; ++i) start(axes_[i], a, b, known);
+        const double limit = known.overlap + kNoLonger * std::abs(known.overlap) + touching();
+        // Always the least one climbs a step: what it rises only adds to the overlap.
+        while (count_ > 0) {
+            Axis* const least = std::min_element(axes_, axes_ + count_,
+                                                 [](const Axis& x, const Axis& y) { return x.overlap < y.overlap; });
+            if (!(least->overlap < limit)) break;
+            Climb* const climb = least->climb_a.steps_left > 0   ? &least->climb_a
+                                 : least->climb_b.steps_left > 0 ? &least->climb_b
+                                                                 : nullptr;
+            if (climb == nullptr) return *least;
+            least->overlap += climb->step();
         }
-        return best;
+        return {};
     }
 
 private:
-    // What the surroundings overlap by beyond the triangles.
-    double rise(const Axis& axis, const Surrounded& a, const Surrounded& b, double enough) const {
-        double rise = 0;
-        if (axis.kind != Axis::Kind::face_a) {
-            const bool edge = axis.kind == Axis::Kind::edges;
-            rise = a.rise(edge ? axis.edge_a : highest_corner(pair_.p, axis.normal), axis.normal, enough);
-        }
-        if (axis.kind != Axis::Kind::face_b && rise < enough) {
-            const bool edge = axis.kind == Axis::Kind::edges;
-            rise += b.rise(edge ? axis.edge_b : highest_corner(pair_.q, -axis.normal), -axis.normal, enough - rise);
-        }
-        return rise;
+    // A face is not climbed from.
+    static void start(Axis& axis, const Surrounded& a, const Surrounded& b, const KnownOverlap& known) {
+        const bool edges = axis.kind == Axis::Kind::edges;
+        const dvec3& n = axis.normal;
+        axis.climb_a = a.climb(edges ? axis.edge_a : a.highest(n), n);
+        axis.climb_b = b.climb(edges ? axis.edge_b : b.highest(-n), -n);
+        if (axis.kind == Axis::Kind::face_a) axis.climb_a.steps_left = 0;
+        if (axis.kind == Axis::Kind::face_b) axis.climb_b.steps_left = 0;
+        if (!(glm::dot(n, known.normal) > kSameDirection)) return;
+        axis.overlap = std::max(axis.overlap, known.overlap);
+        axis.climb_a.steps_left = axis.climb_b.steps_left = 0;
     }
     double overlap(const dvec3& n) const { return pair_.range_a(n).high - pair_.range_b(n).low; }
     void face(Axis::Kind kind, const dvec3& n) {
@@ -208,34 +208,26 @@ private:
 
 } // namespace
 
-double Surrounded::rise(Feature feature, const dvec3& up, double enough) const noexcept {
-    if (hills == nullptr) return 0;
-    const dvec3 there = rotation != nullptr ? up * *rotation : up; // the transpose times it
-    if (feature < kFirstEdge) {
-        const double from = hills->height(corners[feature], there);
-        return hills->climb(corners[feature], there, from + enough).height - from;
-    }
-    const uint32_t first = corners[feature - kFirstEdge], second = corners[(feature - kFirstEdge + 1u) % 3];
-    const double from = hills->height(first, there);
-    return std::max(0.0, hills->climb_from_edge(first, second, there, from + enough).height - from);
-}
-
 Feature Surrounded::highest(const dvec3& up) const noexcept {
-    return highest_corner(triangle.corner, up);
+    const dvec3(&p)[3] = triangle.corner;
+    const double h[3] = {glm::dot(up, p[0]), glm::dot(up, p[1]), glm::dot(up, p[2])};
+    return static_cast<Feature>(std::max_element(h, h + 3) - h);
 }
 
-Hills::Place Surrounded::top(const dvec3& up) const noexcept {
-    return hills->climb(corners[highest(up)], rotation != nullptr ? up * *rotation : up,
-                        std::numeric_limits<double>::infinity());
+Climb Surrounded::climb(Feature from, const dvec3& up) const noexcept {
+    const bool edge = from >= kFirstEdge;
+    const uint32_t first = edge ? from - kFirstEdge : from, second = edge ? (first + 1) % 3 : first;
+    return {hills, rotation != nullptr ? up * *rotation : up, // the transpose times it
+            corners[first], corners[second], hills != nullptr ? kClimbSteps : 0};
 }
 
-TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin, double limit) noexcept {
+TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin, const KnownOverlap& known) noexcept {
     const TrianglePair pair(a.triangle, b.triangle);
     Axes axes(pair, a.closed, b.closed);
-    const Axis axis = axes.least_overlap(a, b, limit);
+    const Axis axis = axes.least_overlap(a, b, known);
     TriangleContact out{};
     out.normal = axis.normal, out.overlap = axis.overlap;
-    if (axis.kind == Axis::Kind::none && limit < HUGE_VAL) return out;
+    if (axis.kind == Axis::Kind::none && known.overlap < HUGE_VAL) return out;
     Points points(pair, margin + axes.touching(), out);
     if (axis.kind == Axis::Kind::edges) {
         const size_t i = axis.edge_a - kFirstEdge, j = axis.edge_b - kFirstEdge;

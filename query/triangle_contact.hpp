@@ -1,5 +1,5 @@
-// How do two triangles that meet, or nearly do, touch, and how can their bodies be taken apart? For contacts; scalar, in
-// double precision.
+// How do two triangles that meet, or nearly do, touch, and how can their bodies be taken apart? For contacts; scalar,
+// in double precision.
 //
 // The normal is one of the separating axis theorem (Gottschalk, Lin and Manocha 1996): a face's, or the product of two
 // edges, which must win clearly, for a face is the steadier normal, and must be where the triangles touch along it. Of
@@ -42,16 +42,13 @@ struct Surrounded {
     PlacedTriangle triangle; ///< in A's frame
     bool closed = false;     ///< its mesh is
     const Hills* hills = nullptr;
-    Triangle corners{};                      ///< their vertices
-    const glm::dmat3* rotation = nullptr;    ///< from the tree's frame to A's; null: none
+    Triangle corners{};                   ///< their vertices
+    const glm::dmat3* rotation = nullptr; ///< from the tree's frame to A's; null: none
 
-    /// By how much the surface around a corner, or an edge that `up` is perpendicular to, rises above it along `up`, in
-    /// A's frame. What is above `enough` may be too little. 0 without hills.
-    double rise(Feature feature, const glm::dvec3& up, double enough) const noexcept;
-    /// The corner that is the highest along `up`.
+    /// The corner that is the highest along `up`, in A's frame.
     Feature highest(const glm::dvec3& up) const noexcept;
-    /// Where the climb from there ends.
-    Hills::Place top(const glm::dvec3& up) const noexcept;
+    /// The climb along `up` from a corner, or from an edge that `up` is perpendicular to. At its end without hills.
+    Climb climb(Feature from, const glm::dvec3& up) const noexcept;
 };
 
 struct TriangleContact {
@@ -68,10 +65,16 @@ struct TriangleContact {
     Point points[kPoints];
 };
 
+/// A direction in which the bodies are known to overlap by so much around the triangles.
+struct KnownOverlap {
+    glm::dvec3 normal{0, 0, 0};
+    double overlap = std::numeric_limits<double>::infinity();
+};
+
 /// The contact along least overlap; points not farther apart than `margin`. None, if there is no way out through the
-/// outsides, or if the overlap is not below `limit`.
+/// outsides, or none that is about as short as the known one: no more than a quarter longer.
 TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin,
-                        double limit = std::numeric_limits<double>::infinity()) noexcept;
+                        const KnownOverlap& known = {}) noexcept;
 
 /// The points along a given normal: the corners of what they cover of each other, cut with the sides of the triangle
 /// that faces it more. `faces` is false if neither does.

@@ -20,7 +20,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
@@ -83,7 +82,7 @@ private:
         alignas(16) float corner[3][kFour][4] = {}; // the fourth coordinate means nothing
         for (uint32_t i = 0; i < count_; ++i)
             for (auto& of_all : corner) { // behind the vertices there are at least the 6 bytes of a triangle
-                std::memcpy(of_all[i], tree.vertex_bytes() + size_t{load_le<Index>(index)} * 3 * sizeof(float), 16);
+                load_le(tree.vertex_bytes() + size_t{load_le<Index>(index)} * 3 * sizeof(float), of_all[i]);
                 index += sizeof(Index);
             }
         for (size_t c = 0; c < 3; ++c) transpose(corner[c], 3 * c);

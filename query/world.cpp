@@ -19,6 +19,7 @@ using query::BoundsTree;
 constexpr uint32_t kMostBodies = uint32_t{1} << 30; // the tree's nodes, twice as many, have 32-bit numbers
 constexpr uint32_t kGrain = 64;                     // boxes
 constexpr float kLargest = 4;                       // a box has at most so many times the slack it began with
+constexpr double kTolerance = 0x1p-5;               // of boxes, small beside the slack: half as dear as bounds()
 
 constexpr Error kOutOfMemory{ErrorCode::out_of_memory, "the world's memory resource gave no more", 0};
 constexpr Error kBadId{ErrorCode::bad_id, "no body has this id, or has it any more", 0};
@@ -125,7 +126,7 @@ World::State::Placement World::State::place(const Entry& entry, const Pose& pose
     const query::Anchor anchor = query::anchor(entry.local, to_world);
     if (query::motion(entry.local, entry.anchor, anchor) <= entry.room)
         return {.stays = true, .room = -1, .box = {}, .anchor = {}};
-    const Bounds box = query::bounds_at(entry.body.tree, entry.local, to_world, entry.body.margin);
+    const Bounds box = query::bounds_at(entry.body.tree, to_world, entry.body.margin, kTolerance);
     const double room = room_for(entry, box);
     const bool still_unbounded = entry.leaf == BoundsTree::kNone && !query::is_finite(box);
     return {.stays = room >= 0 || still_unbounded, .room = room, .box = box, .anchor = anchor};
@@ -195,7 +196,7 @@ Result<BodyId> World::insert(const Body& body) noexcept {
     mark.layers = body.layers, mark.mask = body.mask, mark.alive = true;
     s.mark_moved(index);
     const auto to_world = query::relative_pose({}, body.pose);
-    s.enter(index, query::bounds_at(body.tree, entry.local, to_world, body.margin),
+    s.enter(index, query::bounds_at(body.tree, to_world, body.margin, kTolerance),
             query::anchor(entry.local, to_world));
     ++s.count;
     return s.id(index);

@@ -109,7 +109,8 @@ uint64_t World::State::find_pairs(const Jobs& jobs) {
             stats.changed = static_cast<uint32_t>(changed.size()), stats.box_tests = findings.box_tests;
             return total;
         }
-        found.resize(total + total / 4);
+        if (total > UINT32_MAX) throw std::bad_alloc();
+        found.resize(static_cast<size_t>(std::min<uint64_t>(total + total / 4, UINT32_MAX)));
     }
 }
 
@@ -119,7 +120,7 @@ void World::State::merge_pairs(uint64_t found_count) {
     };
     const uint64_t total = found_count + static_cast<uint64_t>(std::ranges::count_if(pairs, stays));
     if (total > UINT32_MAX) throw std::bad_alloc();
-    next_pairs.reserve(total);
+    next_pairs.reserve(static_cast<size_t>(total));
     free_slots.reserve(slot_count);
 
     next_pairs.clear();
@@ -130,7 +131,7 @@ void World::State::merge_pairs(uint64_t found_count) {
     auto old = pairs.begin();
     for (uint64_t i = 0;;) {
         const uint64_t old_key = old != pairs.end() ? key(old->a.index, old->b.index) : kEnd;
-        const uint64_t new_key = i < found_count ? found[i] : kEnd;
+        const uint64_t new_key = i < found_count ? found[static_cast<size_t>(i)] : kEnd;
         if (old_key == kEnd && new_key == kEnd) break;
         const bool goes_on = old_key == new_key ? names(old->a) && names(old->b) : old_key < new_key && stays(*old);
         if (goes_on) {

@@ -25,8 +25,9 @@ inline constexpr size_t kBlockBoxExponent = 252;  ///< u8[3]: a box step is 2^ex
 inline constexpr size_t kBlockReserved = 255;     ///< 0
 inline constexpr uint8_t kTriangleLeaf = 0x80;    ///< this bit of a count marks a count of triangles instead
 inline constexpr int32_t kMaxBoxOrigin = 1 << 24; ///< above the absolute value of a box origin: a float holds it
-/// A node's exponent less the lattice's: no half extent takes more than sqrt(3) 2^22 steps, so its box fits.
-inline constexpr int32_t kMaxNodeSize = 22;
+/// A node's exponent less the lattice's. No half extent takes more than sqrt(18) 2^21 steps, so its box fits; and no
+/// square of an entry, in steps, is a subnormal float.
+inline constexpr int32_t kMinNodeSize = -30, kMaxNodeSize = 21;
 inline constexpr uint8_t kMaxBoxExponent = 22;
 
 static_assert(kBlockReserved + 1 == kBlockBytes && kBlockBytes % kBlockAlignment == 0);

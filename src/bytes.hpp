@@ -1,6 +1,8 @@
 // Little-endian loads and stores at any alignment, on any host.
 #pragma once
 
+#include "src/host.hpp"
+
 #include <bit>
 #include <concepts>
 #include <cstddef>
@@ -24,6 +26,15 @@ template <class T> T load_le(const std::byte* from) noexcept {
             bits = static_cast<Bits>(bits | (static_cast<Bits>(from[i]) << (8 * i)));
     }
     return std::bit_cast<T>(bits);
+}
+
+/// kCount numbers in a row.
+template <class T, size_t kCount> void load_le(const std::byte* from, T (&to)[kCount]) noexcept {
+    if constexpr (std::endian::native == std::endian::little) {
+        std::memcpy(to, from, sizeof to);
+    } else {
+        for (size_t i = 0; i < kCount; ++i) to[i] = load_le<T>(from + sizeof(T) * i);
+    }
 }
 
 template <class T> void store_le(std::byte* to, T value) noexcept {

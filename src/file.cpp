@@ -1,11 +1,12 @@
 // Reading and atomic writing of whole files (POSIX).
+#include "src/can_save.hpp"
+
 #include <prolate/tree.hpp>
 
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
-#include <memory>
 #include <string>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -16,6 +17,11 @@ namespace {
 
 Error io(const char* what) {
     return {ErrorCode::io, what, static_cast<uint64_t>(errno)};
+}
+
+// With its last slash, or empty.
+std::string folder_of(const std::string& path) {
+    return path.substr(0, path.rfind('/') + 1);
 }
 
 class Descriptor {
@@ -34,6 +40,27 @@ public:
 private:
     int fd_;
 };
+
+// The file behind a path: where symbolic links lead, whether or not a file is there yet.
+std::string resolved(const char* given) {
+    std::string path = given;
+    for (int links = 0; links < 40; ++links) { // as many as Linux follows
+        char target[4096];
+        const ssize_t length = ::readlink(path.c_str(), target, sizeof target);
+        if (length <= 0 || length == static_cast<ssize_t>(sizeof target)) break; // no link
+        const std::string next(target, static_cast<size_t>(length));
+        path = next.starts_with('/') ? next : folder_of(path) + next;
+    }
+    return path;
+}
+
+// A new, empty file beside `path` that is to take its name; with its own name in `name`.
+int create_temporary(const std::string& path, std::string& name) {
+    constexpr size_t kKept = 200; // bytes of the name, so that the ending fits into the 255 of most file systems
+    const std::string folder = folder_of(path);
+    name = folder + path.substr(folder.size(), kKept) + ".tmp-XXXXXX";
+    return ::mkostemp(name.data(), O_CLOEXEC);
+}
 
 bool write_all(int fd, std::span<const std::byte> bytes) {
     while (!bytes.empty()) {
@@ -75,19 +102,44 @@ Result<Tree> load(const char* path) {
     return Tree::open(std::move(bytes));
 }
 
+Result<void> can_save(const char* given_path) {
+    const std::string path = resolved(given_path);
+    struct stat status {};
+    if (::stat(path.c_str(), &status) == 0) {
+        if (S_ISDIR(status.st_mode)) return Error{ErrorCode::io, "cannot write there", EISDIR};
+        if (!S_ISREG(status.st_mode)) {
+            if (::access(path.c_str(), W_OK) != 0) return io("cannot write there");
+            return {};
+        }
+        // In a sticky folder only its owner, the file's owner, and root may replace a file.
+        struct stat folder {};
+        const uid_t user = ::geteuid();
+        if (::stat((folder_of(path) + ".").c_str(), &folder) == 0 && (folder.st_mode & S_ISVTX) != 0 && user != 0 &&
+            user != folder.st_uid && user != status.st_uid)
+            return Error{ErrorCode::io, "cannot replace another user's file in its folder", EPERM};
+    } else if (errno != ENOENT) {
+        return io("cannot write there");
+    }
+    // The rest only a trial tells: permissions, file systems that are read-only, full or of another mind.
+    std::string temporary;
+    const Descriptor trial(create_temporary(path, temporary));
+    if (!trial) return io("cannot create a file there");
+    ::unlink(temporary.c_str());
+    return {};
+}
+
 Result<void> save(const char* given_path, std::span<const std::byte> bytes) {
     // Behind a symbolic link, its target is replaced and the link kept.
-    const std::unique_ptr<char, decltype(&std::free)> real(::realpath(given_path, nullptr), &std::free);
-    const char* const path = real ? real.get() : given_path;
+    const std::string path = resolved(given_path);
     struct stat status {};
-    if (::stat(path, &status) == 0 && !S_ISREG(status.st_mode)) { // a pipe or device: nothing to replace
-        Descriptor device(::open(path, O_WRONLY | O_CLOEXEC));
+    if (::stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) { // a pipe or device: nothing to replace
+        Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
         if (!device) return io("cannot open the output");
         if (!write_all(device.get(), bytes) || !device.close()) return io("cannot write the output");
         return {};
     }
-    std::string temporary = std::string(path) + ".tmp-XXXXXX";
-    Descriptor file(::mkostemp(temporary.data(), O_CLOEXEC));
+    std::string temporary;
+    Descriptor file(create_temporary(path, temporary));
     if (!file) return io("cannot create a file there");
     const auto give_up = [&](const char* what) {
         const Error error = io(what);
@@ -101,14 +153,13 @@ Result<void> save(const char* given_path, std::span<const std::byte> bytes) {
         ::umask(mask);
         mode = 0666 & ~mask;
     }
-    if (::fchmod(file.get(), mode) != 0) return give_up("cannot set the file's mode");
+    // A file system that refuses has modes of its own, or the file stays private: no reason to lose the content.
+    static_cast<void>(::fchmod(file.get(), mode));
     if (!write_all(file.get(), bytes) || ::fsync(file.get()) != 0 || !file.close())
         return give_up("cannot write the file");
-    if (::rename(temporary.c_str(), path) != 0) return give_up("cannot move the file to its name");
+    if (::rename(temporary.c_str(), path.c_str()) != 0) return give_up("cannot move the file to its name");
     // Make the new name durable; a file system that cannot is no reason to fail.
-    const std::string name(path);
-    const size_t slash = name.rfind('/');
-    const std::string folder = slash == std::string::npos ? "." : name.substr(0, slash + 1);
+    const std::string folder = folder_of(path) + ".";
     if (const Descriptor directory(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)); directory)
         ::fsync(directory.get());
     return {};

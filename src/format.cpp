@@ -12,8 +12,11 @@
 #include <cassert>
 #include <cstring>
 #include <iterator>
+#include <new>
 #include <numeric>
 #include <optional>
+#include <span>
+#include <utility>
 
 namespace prolate::format {
 namespace {
@@ -66,8 +69,10 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     const uint64_t blocks_end = end_of_blocks(level_count, bounding_blocks + first_block.back());
     const auto vertex_count = static_cast<uint32_t>(triangles.vertices.size());
     const auto triangle_count = static_cast<uint32_t>(triangles.triangles.size());
-    std::vector<std::byte> bytes(blocks_end +
-                                 (info.exact ? section_bytes(first_block.back(), vertex_count, triangle_count) : 0));
+    const uint64_t total =
+        blocks_end + (info.exact ? section_bytes(first_block.back(), vertex_count, triangle_count) : 0);
+    if (!std::in_range<size_t>(total)) throw std::bad_alloc();
+    std::vector<std::byte> bytes(static_cast<size_t>(total));
     std::byte* const h = bytes.data();
 
     std::memcpy(h + kAtMagic, kMagic, sizeof kMagic);
@@ -75,7 +80,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     store_le(h + kAtHeaderSize, static_cast<uint16_t>(kHeaderBytes));
     store_le(h + kAtFlags, (info.surface_mode ? kSurfaceMode : 0u) | (info.exact ? kExact : 0u) |
                                (info.proved ? kProved : 0u) | (info.goal_reached ? 0u : kGoalMissed));
-    store_le(h + kAtTotalSize, uint64_t{bytes.size()});
+    store_le(h + kAtTotalSize, total);
     store_le(h + kAtSourceHash, info.source_hash);
     store_le(h + kAtOptionsHash, info.options_hash);
     store_le(h + kAtNodeCount, static_cast<uint32_t>(node_count));
@@ -97,11 +102,17 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
     store_le(h + kAtResolution, info.resolution);
     store_le(h + kAtSolidVolumeError, info.solid_volume_error);
     store_le(h + kAtDiagonal, info.diagonal);
+    for (size_t i = 0; i < 3; ++i) {
+        store_le(h + kAtScale + 8 * i, info.placement.scale[i]);
+        store_le(h + kAtMeshOrigin + 8 * i, info.placement.origin[i]);
+    }
+    store_le(h + kAtWeld, info.weld);
     if (info.exact) {
         store_le(h + kAtVertexCount, vertex_count);
         store_le(h + kAtTriangleCount, triangle_count);
         store_le(h + kAtComponentCount, triangles.components);
-        store_section({h + blocks_end, bytes.size() - blocks_end}, first_block.back() * kHullBytes, triangles);
+        store_section(std::span(bytes).subspan(static_cast<size_t>(blocks_end)),
+                      static_cast<size_t>(first_block.back()) * kHullBytes, triangles);
     }
 
     std::optional<Bounding> bounding;

@@ -2,14 +2,22 @@
 //
 // A node's numbers are integers times powers of two, so that decoding is exact and the same everywhere:
 //     center = (origin + q) * 2^step_exponent           q: three uint16, |origin + q| < 2^24: exact in a float
-//     l_ii   = d_i * 2^(exponent - 16)                  d: three uint16, 1 ... 65535
-//     l_ij   = o_j * 2^(exponent - 15)                  o: three int16
+//     l_ii   = d_i^2 * 2^(exponent - 30)                d: three uint16, 1 ... 65535
+//     l_ij   = o_j |o_j| * 2^(exponent - 30)            o: three int16      both rounded to a float
+// Squares, because the entries of a thin ellipsoid's factor are both large and small: where the largest is 1, steps at
+// 1 are 6e-5, and at 1e-4 they are 6e-7, so that needles and sheets of axis ratios of 10^4 keep their shape. A step of
+// a large entry tilts a sheet, though; builder/cover.cpp looks for large entries whose roundings go well together.
 // Writing rounds to nearest; the builder then scales the *decoded* ellipsoid until it covers (builder/cover.cpp).
 #pragma once
 
+#include "src/power_of_two.hpp"
+
 #include <prolate/tree.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <vector>
 
@@ -19,7 +27,18 @@ using Lattice = LatticeInfo;
 
 inline constexpr int32_t kMaxCoordinate = 1 << 24; ///< |origin + q| stays below: integers that a float holds exactly
 inline constexpr int32_t kMinStepExponent = -120, kMaxStepExponent = 60;
-inline constexpr int32_t kMinNodeExponent = -100, kMaxNodeExponent = 100;
+inline constexpr int32_t kMinNodeExponent = -90, kMaxNodeExponent = 100; ///< no entry is subnormal
+
+/// What an integer of a node's factor stands for, before it is rounded to a float.
+inline double entry(int32_t q, int32_t exponent) noexcept {
+    return static_cast<double>(q) * std::abs(q) * power_of_two(exponent - 30);
+}
+/// The integer whose entry is nearest.
+inline int32_t nearest_entry(double value, int32_t exponent) noexcept {
+    const double square = std::abs(value) * power_of_two(30 - exponent), q = std::floor(std::sqrt(square));
+    const bool up = square - q * q > (q + 1) * (q + 1) - square;
+    return static_cast<int32_t>(std::copysign(std::min(up ? q + 1 : q, 1e6), value)); // no integer reaches 1e6
+}
 
 /// A node as stored, but for the place of its children or triangles, which encode() finds.
 struct PackedNode {

@@ -50,7 +50,11 @@ enum HeaderOffset : size_t {
     kAtDiagonal = 128,
     kAtSolidVolumeError = 136,
     kAtDistance = 140,
-    kHeaderBytes = 144,
+    kAtScale = 144,
+    kAtMeshOrigin = 168,
+    kAtWeld = 192,
+    kAtReserved2 = 196,
+    kHeaderBytes = 200,
 };
 enum Flag : uint32_t { kSurfaceMode = 1, kExact = 2, kProved = 4, kGoalMissed = 8, kAllFlags = 15 };
 

@@ -80,6 +80,15 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     if (!is_metric(load_le<double>(h + kAtDiagonal))) return bad("diagonal out of range", kAtDiagonal);
     if (!is_metric(load_le<float>(h + kAtSolidVolumeError)))
         return bad("solid volume error out of range", kAtSolidVolumeError);
+    for (size_t i = 0; i < 3; ++i) {
+        const double scale = load_le<double>(h + kAtScale + 8 * i);
+        if (!std::isfinite(scale) || scale == 0) return bad("scale of the mesh out of range", kAtScale + 8 * i);
+        if (!std::isfinite(load_le<double>(h + kAtMeshOrigin + 8 * i)))
+            return bad("origin of the mesh out of range", kAtMeshOrigin + 8 * i);
+    }
+    if (!std::isfinite(load_le<float>(h + kAtWeld))) return bad("option out of range", kAtWeld);
+    if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
+        return bad("reserved bytes are not zero", kAtReserved2);
     if (!(flags & kExact)) {
         if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
             return bad("triangle counts of a tree without triangles", kAtVertexCount);
@@ -207,6 +216,8 @@ private:
             return bad("node size out of range", block + at_size);
         if (exponent - step_exponent_ > kMaxNodeSize)
             return bad("a node is too large for the lattice's step", block + at_size);
+        if (exponent - step_exponent_ < kMinNodeSize)
+            return bad("a node is too small for the lattice's step", block + at_size);
         for (size_t i = 0; i < 3; ++i)
             if (const size_t here = block_offset(kBlockDiagonal, i, lane); load_le<uint16_t>(from + here) == 0)
                 return bad("a node has no extent", block + here);
@@ -314,9 +325,10 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         const LevelInfo level = view.level(l);
         view.node_count_ += level.node_count;
         view.block_count_ += level.block_count;
-        const size_t begin = level.end_byte - level.block_count * kBlockBytes;
+        const size_t level_bytes = level.block_count * kBlockBytes;
+        const size_t begin = static_cast<size_t>(level.end_byte) - level_bytes;
         const auto hash = [&] {
-            return l > 0 ? hash_bytes(bytes.subspan(begin, level.end_byte - begin))
+            return l > 0 ? hash_bytes(bytes.subspan(begin, level_bytes))
                          : root_hash(bytes, level_count, bounding_blocks);
         };
         if (options.check_hash && hash() != load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
@@ -350,7 +362,8 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         return bad("the leaves do not share out the triangles", kAtTriangleCount);
     if (!exact || view.is_prefix_) return view;
 
-    const size_t hulls = present_end, hull_bytes = view.block_count_ * kHullBytes, hash = hulls + hull_bytes;
+    const auto hulls = static_cast<size_t>(present_end);
+    const size_t hull_bytes = view.block_count_ * kHullBytes, hash = hulls + hull_bytes;
     const size_t vertices = hash + kSectionHashBytes;
     if (options.check_hash && section_hash(bytes.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
         return bad("the triangles are damaged (hash mismatch)", hash);
@@ -365,8 +378,10 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.component_count_ = load_le<uint32_t>(h + kAtComponentCount);
     for (uint32_t v = 0; v < vertex_count; ++v) {
         const Vec3 p = view.vertex(v);
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            return bad("a vertex is not finite", vertices + size_t{v} * kVertexBytes);
+        for (const float x : {p.x, p.y, p.z})
+            if (!(std::abs(x) <= kLargestCoordinate)) // also a NaN
+                return bad("a vertex is not finite, or beyond the largest coordinate (2^74 m)",
+                           vertices + size_t{v} * kVertexBytes);
     }
     for (uint32_t t = 0; t < triangle_count; ++t)
         for (const uint32_t corner : view.triangle(t))

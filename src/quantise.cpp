@@ -37,18 +37,17 @@ void quantise(PackedNode& node, const Lattice& lattice, const double center[3], 
     }
     const double diagonal[3] = {factor[0], factor[2], factor[5]};
     const double off[3] = {factor[1], factor[3], factor[4]};
-    double largest = 0;
-    for (int i = 0; i < 3; ++i) largest = std::max({largest, diagonal[i], std::abs(off[i])});
-    // The smallest exponent at which the largest entry fits after rounding.
-    int exponent =
-        std::clamp(largest > 0 ? std::ilogb(largest) + 1 : kMinNodeExponent, kMinNodeExponent, kMaxNodeExponent);
-    if (std::ldexp(largest, 16 - exponent) > UINT16_MAX - 1.0 && exponent < kMaxNodeExponent) ++exponent;
+    double largest = 0; // an entry of the diagonal may be four times as large
+    for (int i = 0; i < 3; ++i) largest = std::max({largest, diagonal[i] / 4, std::abs(off[i])});
+    // The smallest exponent at which all entries fit after rounding.
+    const int lowest = std::max(kMinNodeExponent, lattice.step_exponent + kMinNodeSize);
+    int exponent = std::clamp(largest > 0 ? std::ilogb(largest) + 1 : lowest, lowest, kMaxNodeExponent);
+    constexpr double kFull = INT16_MAX * double{INT16_MAX} * 0x1p-30;
+    if (std::ldexp(largest, -exponent) > kFull && exponent < kMaxNodeExponent) ++exponent;
     node.exponent = static_cast<int8_t>(exponent);
     for (size_t i = 0; i < 3; ++i) {
-        node.diagonal[i] = static_cast<uint16_t>(
-            std::clamp(std::nearbyint(std::ldexp(diagonal[i], 16 - exponent)), 1.0, double{UINT16_MAX}));
-        node.off_diagonal[i] = static_cast<int16_t>(
-            std::clamp(std::nearbyint(std::ldexp(off[i], 15 - exponent)), double{INT16_MIN}, double{INT16_MAX}));
+        node.diagonal[i] = static_cast<uint16_t>(std::clamp(nearest_entry(diagonal[i], exponent), 1, UINT16_MAX));
+        node.off_diagonal[i] = static_cast<int16_t>(std::clamp(nearest_entry(off[i], exponent), INT16_MIN, INT16_MAX));
     }
 }
 
@@ -94,9 +93,8 @@ Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept {
     const auto coordinate = [&](size_t i) {
         return static_cast<float>(lattice.origin[i] + int32_t{node.center[i]}) * step;
     };
-    const auto half_unit = static_cast<float>(power_of_two(node.exponent - 15)); // perhaps subnormal
-    const auto diagonal = [&](size_t i) { return static_cast<float>(node.diagonal[i]) * (half_unit * 0.5f); };
-    const auto off = [&](size_t i) { return static_cast<float>(node.off_diagonal[i]) * half_unit; };
+    const auto diagonal = [&](size_t i) { return static_cast<float>(entry(node.diagonal[i], node.exponent)); };
+    const auto off = [&](size_t i) { return static_cast<float>(entry(node.off_diagonal[i], node.exponent)); };
     return {.center = {coordinate(0), coordinate(1), coordinate(2)},
             .l11 = diagonal(0),
             .l21 = off(0),

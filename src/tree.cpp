@@ -62,6 +62,11 @@ LevelInfo TreeView::level(uint32_t l) const noexcept {
 
 BakeInfo TreeView::bake_info() const noexcept {
     const std::byte* const h = bytes_.data();
+    Placement placement;
+    for (size_t i = 0; i < 3; ++i) {
+        placement.scale[i] = load_le<double>(h + kAtScale + 8 * i);
+        placement.origin[i] = load_le<double>(h + kAtMeshOrigin + 8 * i);
+    }
     return {.source_hash = load_le<uint64_t>(h + kAtSourceHash),
             .options_hash = load_le<uint64_t>(h + kAtOptionsHash),
             .surface_mode = surface_mode(),
@@ -81,7 +86,9 @@ BakeInfo TreeView::bake_info() const noexcept {
             .levels = load_le<uint32_t>(h + kAtLevels),
             .ellipsoids = load_le<uint32_t>(h + kAtEllipsoids),
             .seed = load_le<uint64_t>(h + kAtSeed),
-            .resolution = load_le<uint32_t>(h + kAtResolution)};
+            .resolution = load_le<uint32_t>(h + kAtResolution),
+            .placement = placement,
+            .weld = load_le<float>(h + kAtWeld)};
 }
 
 bool TreeView::is_node(uint32_t slot) const noexcept {

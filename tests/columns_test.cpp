@@ -45,20 +45,25 @@ TEST(Columns, AreRightThroughEdgesAndVertices) {
     EXPECT_EQ(columns.volume().value, 1.0); // 16 of 25: the symbolic step takes one border of two
 }
 
+// Two overlapping balls of radius 1, their centers 1 apart, around a cube of side 1/2 inside both; and around one so
+// small that its own lattice would have 10^9 columns in them.
 TEST(Columns, MeasureAUnionAgainstTheSolid) {
-    // Two overlapping balls of radius 1, their centers 1 apart, around a cube of side 1/2 inside both.
-    const Mesh cube = shapes::moved(shapes::box(0.5f, 0.5f, 0.5f), {0.25f, -0.25f, -0.25f});
-    const std::vector<Ellipsoid> balls{{}, {.center = {1, 0, 0}}};
-    const CoverVolume volume = measure_cover(measuring_columns(cube.view(), true, Winding(cube.view()), 400), balls);
-    const double ball = 4.0 / 3.0 * std::numbers::pi, lens = std::numbers::pi / 12 * (4 + 1) * (2 - 1) * (2 - 1);
-    const auto expect = [](const Quadrature& measured, double exact) {
-        EXPECT_LE(std::abs(measured.value - exact), measured.error);
-        EXPECT_LE(measured.error, 1e-3);
-    };
-    expect(volume.whole, 2 * ball - lens);
-    expect(volume.solid, 0.125);
-    expect(volume.outside, 2 * ball - lens - 0.125);
-    expect(volume.sum_outside, 2 * (ball - 0.125));
+    for (const float side : {0.5f, 0.02f}) {
+        const Mesh cube = shapes::moved(shapes::box(side, side, side), {0.25f, -0.25f, -0.25f});
+        const std::vector<Ellipsoid> balls{{}, {.center = {1, 0, 0}}};
+        const CoverVolume volume =
+            measure_cover(measuring_columns(cube.view(), true, Winding(cube.view()), 400), balls);
+        const double ball = 4.0 / 3.0 * std::numbers::pi, lens = std::numbers::pi / 12 * (4 + 1) * (2 - 1) * (2 - 1);
+        const double solid = std::pow(double{side}, 3);
+        const auto expect = [](const Quadrature& measured, double exact) {
+            EXPECT_LE(std::abs(measured.value - exact), measured.error);
+            EXPECT_LE(measured.error, 1e-3);
+        };
+        expect(volume.whole, 2 * ball - lens);
+        expect(volume.solid, solid);
+        expect(volume.outside, 2 * ball - lens - solid);
+        expect(volume.sum_outside, 2 * (ball - solid));
+    }
 }
 
 } // namespace

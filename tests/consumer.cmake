@@ -5,6 +5,8 @@
 #   subdirectory  adds ROOT with add_subdirectory()
 #   query_only    builds and installs ROOT where Eigen, Assimp and oneTBB cannot be found, proves that the compiler
 #                 opened none of their headers, and finds the package there; needs the trees that `installed` baked
+# What is installed is compared with include/prolate: a header that was added cannot be forgotten. Each is compiled
+# alone, and each that README's table names is used.
 cmake_minimum_required(VERSION 3.25)
 
 # run(STATUS OUTPUT COMMAND...): runs it, demands the exit status and, as a regular expression, the output.
@@ -25,6 +27,37 @@ function(configure_and_build source build)
   run(0 "" ${CMAKE_COMMAND} --build ${build})
 endfunction()
 
+# expect_headers(FOLDER HEADERS...): the folder holds all public headers but for those named.
+function(expect_headers folder)
+  file(GLOB expected RELATIVE ${ROOT}/include/prolate ${ROOT}/include/prolate/*)
+  if(ARGN)
+    list(REMOVE_ITEM expected ${ARGN})
+  endif()
+  file(GLOB found RELATIVE ${folder} ${folder}/*)
+  if(NOT found STREQUAL expected)
+    message(FATAL_ERROR "installed: ${found}\nexpected: ${expected}")
+  endif()
+endfunction()
+
+# README's table of headers: those that it names, in all columns.
+file(STRINGS ${ROOT}/README.md table REGEX "^\\| `[a-z]+\\.hpp` \\|")
+string(REGEX MATCHALL "[a-z]+\\.hpp" in_table "${table}")
+list(SORT in_table)
+
+# use_rows(TREE HEADERS...): the answers of all rows are right, and no header of the table is left out but those named.
+function(use_rows tree)
+  execute_process(COMMAND ${programs}/rows ${tree} OUTPUT_VARIABLE output COMMAND_ERROR_IS_FATAL ANY)
+  string(REGEX MATCHALL "[^\n]+" used "${output}")
+  list(SORT used)
+  set(expected ${in_table})
+  if(ARGN)
+    list(REMOVE_ITEM expected ${ARGN})
+  endif()
+  if(NOT expected OR NOT used STREQUAL expected)
+    message(FATAL_ERROR "used: ${used}\nREADME's table: ${expected}")
+  endif()
+endfunction()
+
 set(consumer ${ROOT}/tests/consumer)
 set(programs ${WORK}/${HOW})
 set(prefix ${WORK}/${HOW}-prefix)
@@ -40,7 +73,9 @@ if(HOW STREQUAL "installed")
       message(FATAL_ERROR "${file} is not installed")
     endif()
   endforeach()
-  configure_and_build(${consumer} ${programs} -D CMAKE_PREFIX_PATH=${prefix})
+  expect_headers(${prefix}/include/prolate)
+  configure_and_build(${consumer} ${programs} -D CMAKE_PREFIX_PATH=${prefix}
+    -D INSTALLED_HEADERS=${prefix}/include/prolate)
 elseif(HOW STREQUAL "subdirectory")
   configure_and_build(${consumer} ${programs} -D PROLATE_SOURCE=${ROOT})
 elseif(HOW STREQUAL "query_only")
@@ -49,8 +84,9 @@ elseif(HOW STREQUAL "query_only")
   run(0 "opened no header of the builder's libraries" ${CMAKE_COMMAND} -D BUILD=${WORK}/query_only-library
     -P ${CMAKE_CURRENT_LIST_DIR}/opened_headers.cmake)
   run(0 "" ${CMAKE_COMMAND} --install ${WORK}/query_only-library --prefix ${prefix})
+  expect_headers(${prefix}/include/prolate build.hpp mesh.hpp verify.hpp)
   configure_and_build(${consumer} ${programs} -D CMAKE_PREFIX_PATH=${prefix} -D USE_BUILDER=OFF
-    ${without_builder_libraries})
+    -D INSTALLED_HEADERS=${prefix}/include/prolate ${without_builder_libraries})
   # A runtime-only package must say so when asked for the builder.
   run(1 "installed without its builder" ${CMAKE_COMMAND} -S ${consumer} -B ${programs}-refused -G Ninja -D CMAKE_CXX_COMPILER=${CXX}
     -D CMAKE_PREFIX_PATH=${prefix} -D USE_BUILDER=ON)
@@ -70,3 +106,8 @@ run(0 "^separated after [1-9]" ${programs}/query ${cube} ${cube} 10)
 run(1 "^query: " ${programs}/query ${cube} ${consumer}/cube.obj 0)
 run(2 "^usage: " ${programs}/query ${cube} ${cube})
 run(0 "pose +1 of 100.*separated.*overlapping.*100 poses" ${programs}/approach ${cube} ${cube})
+if(HOW STREQUAL "query_only")
+  use_rows(${cube} tbb.hpp) # oneTBB is not there
+else()
+  use_rows(${cube})
+endif()

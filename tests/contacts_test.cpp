@@ -357,38 +357,154 @@ double lowest_along(const Mesh& mesh, const Quat& rotation, const Point& up) {
     }
     return low;
 }
-double deepest_of(const ContactManifolds& m) {
+// Deepest point of a manifold.
+double depth_of(const Manifold& m) {
     double out = -HUGE_VAL;
-    for (uint32_t i = 0; i < m.count; ++i)
-        for (uint32_t k = 0; k < m.manifolds[i].count; ++k)
-            out = std::max(out, double{m.manifolds[i].points[k].depth});
+    for (uint32_t k = 0; k < m.count; ++k) out = std::max(out, double{m.points[k].depth});
     return out;
+}
+Point operator+(const Point& a, const Point& b) {
+    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+// The pose at which `mesh` is so deep in the half-space below `surface`, a point, `up` being its outward normal.
+Pose resting(const Mesh& mesh, const Quat& rotation, const Point& up, const Point& surface, double depth) {
+    const double h = -lowest_along(mesh, rotation, up) - depth;
+    return {scenes::to_float(surface + Point{h * up[0], h * up[1], h * up[2]}), rotation};
 }
 
 TEST(Contacts, FlatGroundHasOneNormalAndTheDepthOfTheDeepestVertex) {
     const auto bodies = convex_bodies();
     Random random(22);
-    for (const Ground& ground : grounds()) {
-        const Point up = scenes::rotate(ground.rotation, {0, 0, 1});
+    for (const Ground& ground : grounds())
         for (const Convex& body : bodies)
-            for (const double depth : {0.001, 0.01, 0.03, 0.1}) {
+            for (const double depth : {-0.005, 0.001, 0.01, 0.03, 0.1}) {
                 int ghosts = 0;
                 double worst = 0;
-                for (int i = 0; i < 25; ++i) {
-                    Pose pose{{}, random.rotation()};
-                    const double height = -lowest_along(body.mesh, pose.rotation, up) - depth;
-                    pose.translation = scenes::to_float(
-                        scenes::rotate(ground.rotation, {random.in(-0.5, 0.5), random.in(-0.5, 0.5), height}));
-                    const ContactManifolds m = fresh(ground.solid, {}, body.solid, pose);
-                    bool ghost = m.count != 1;
-                    for (uint32_t k = 0; k < m.count; ++k)
-                        ghost = ghost || dot(m.manifolds[k].normal, scenes::to_float(up)) < 1 - 1e-6;
-                    ghosts += ghost;
-                    worst = std::max(worst, std::abs(deepest_of(m) - depth));
+                for (int i = 0; i < 20; ++i) {
+                    const Pose below{scenes::to_float(random.direction()), random.rotation()};
+                    const auto placed = [&](const Point& p) {
+                        return scenes::rotate(below.rotation, scenes::rotate(ground.rotation, p));
+                    };
+                    const Point up = placed({0, 0, 1}),
+                                surface = placed({random.in(-0.5, 0.5), random.in(-0.5, 0.5), 0}) +
+                                          Point{below.translation.x, below.translation.y, below.translation.z};
+                    const Pose pose = resting(body.mesh, random.rotation(), up, surface, depth);
+                    const float margin = depth < 0 || i % 2 == 0 ? 0.01f : 0;
+                    const bool swap = i % 4 < 2;
+                    const ContactManifolds m = swap ? fresh(body.solid, pose, ground.solid, below, margin)
+                                                    : fresh(ground.solid, below, body.solid, pose, margin);
+                    const double along = dot(m.manifolds[0].normal, scenes::to_float(up));
+                    ghosts += m.count != 1 || (swap ? -along : along) < 1 - 1e-6;
+                    worst = std::max(worst, std::abs(depth_of(m.manifolds[0]) - depth));
                 }
                 EXPECT_EQ(ghosts, 0) << ground.name << ", " << body.name << ", " << depth;
-                EXPECT_LT(worst, 1e-6 + 0.01 * depth) << ground.name << ", " << body.name << ", " << depth;
+                EXPECT_LT(worst, 1e-6 + 0.01 * std::abs(depth)) << ground.name << ", " << body.name << ", " << depth;
             }
+}
+
+TEST(Contacts, FineBallsReportTheirDepth) {
+    const Mesh fine = shapes::icosphere(5);
+    const Solid ball = exact(fine), cube = unit_box();
+    Random random(23);
+    for (const double depth : {0.003, 0.01, 0.1})
+        for (int i = 0; i < 10; ++i) {
+            const Point d = random.direction();
+            const ContactManifolds on_cube = fresh(
+                cube, {}, ball, resting(fine, random.rotation(), {0, 0, 1}, {0.1 * d[0], 0.1 * d[1], 0.5}, depth));
+            ASSERT_EQ(on_cube.count, 1u);
+            EXPECT_GT(on_cube.manifolds[0].normal.z, 1 - 1e-5);
+            EXPECT_NEAR(depth_of(on_cube.manifolds[0]), depth, 0.01 * depth);
+
+            const Pose below{{}, random.rotation()};
+            const double top = -lowest_along(fine, below.rotation, {-d[0], -d[1], -d[2]});
+            const ContactManifolds on_ball = fresh(
+                ball, below, ball, resting(fine, random.rotation(), d, {top * d[0], top * d[1], top * d[2]}, depth));
+            ASSERT_EQ(on_ball.count, 1u);
+            EXPECT_GT(dot(on_ball.manifolds[0].normal, scenes::to_float(d)), std::cos(0.03));
+            EXPECT_NEAR(depth_of(on_ball.manifolds[0]), depth, 0.1 * depth + 2e-4); // facets
+        }
+}
+
+// A sheet of cells, bent along x = 0: a roof where slope > 0, else a valley.
+Mesh bent(uint32_t cells, float slope) {
+    Mesh mesh = shapes::moved(shapes::sheet(4, 4, cells), {-2, -2, 0});
+    for (Vec3& v : mesh.vertices) v.z = -slope * std::abs(v.x);
+    return mesh;
+}
+
+TEST(Contacts, ConvexEdgesHaveTheNormalOfWhatLiesOnThem) {
+    constexpr uint32_t kCells = 16;
+    const Mesh mesh = shapes::moved(shapes::box(), {-0.5f, -0.5f, -0.5f});
+    const Solid cube = exact(mesh);
+    Random random(24);
+    for (const float slope : {0.1f, 0.5f, 1.0f})
+        for (const bool closed : {false, true}) {
+            const Mesh roof = bent(kCells, slope);
+            const Solid ground = closed ? exact(slab_below(roof, kCells, 3)) : exact(roof, false);
+            for (const double depth : {0.001, 0.01, 0.03})
+                for (int i = 0; i < 20; ++i) { // a face of the cube lies across the ridge, tilted less than the slope
+                    const double tilt = random.in(-0.4, 0.4) * std::atan(slope), turn = random.in(0, 6);
+                    const double s = std::sin(tilt / 2), c = std::cos(tilt / 2), u = std::sin(turn / 2),
+                                 w = std::cos(turn / 2);
+                    const Quat rotation{static_cast<float>(s * u), static_cast<float>(s * w), static_cast<float>(c * u),
+                                        static_cast<float>(c * w)};
+                    const Point up = scenes::rotate(rotation, {0, 0, 1});
+                    const Pose pose = resting(mesh, rotation, up, {0, random.in(-1, 1), 0}, depth);
+                    const ContactManifolds m = fresh(ground, {}, cube, pose);
+                    ASSERT_EQ(m.count, 1u) << slope << ' ' << closed << ' ' << depth << ' ' << i;
+                    EXPECT_GT(dot(m.manifolds[0].normal, scenes::to_float(up)), std::cos(0.02 + 2 * depth));
+                    EXPECT_NEAR(depth_of(m.manifolds[0]), depth, 0.01 * depth);
+                }
+        }
+}
+
+TEST(Contacts, ConcaveEdgesHaveTheNormalsOfBothFaces) {
+    constexpr uint32_t kCells = 16;
+    Random random(25);
+    for (const int fineness : {2, 4}) {
+        const Mesh mesh = shapes::moved(shapes::icosphere(fineness), {}, 0.5f);
+        const Solid ball = exact(mesh);
+        for (const float slope : {0.5f, 1.0f})
+            for (const bool closed : {false, true}) {
+                const Mesh valley = bent(kCells, -slope);
+                const Solid ground = closed ? exact(slab_below(valley, kCells, 1)) : exact(valley, false);
+                const double size = std::hypot(1, slope);
+                const Point sides[2] = {{slope / size, 0, 1 / size}, {-slope / size, 0, 1 / size}};
+                for (const double depth : {0.001, 0.003, 0.01})
+                    for (int i = 0; i < 10; ++i) { // as deep in the one side as in the other
+                        const Quat rotation = random.rotation();
+                        const double h = -lowest_along(mesh, rotation, sides[0]) - depth,
+                                     k = -lowest_along(mesh, rotation, sides[1]) - depth;
+                        const Pose pose{scenes::to_float({(h - k) / (2 * sides[0][0]), random.in(-1, 1),
+                                                          (h + k) / (2 * sides[0][2])}),
+                                        rotation};
+                        const ContactManifolds m = fresh(ground, {}, ball, pose);
+                        ASSERT_EQ(m.count, 2u);
+                        for (const Point& side : sides) {
+                            const auto of_side = [&](const Manifold& n) {
+                                return dot(n.normal, scenes::to_float(side)) > 1 - 1e-5 &&
+                                       std::abs(depth_of(n) - depth) < 0.02 * depth;
+                            };
+                            EXPECT_EQ(std::count_if(m.manifolds, m.manifolds + 2, of_side), 1);
+                        }
+                    }
+            }
+    }
+}
+
+TEST(Contacts, ABudgetBoundsTriangleTestsToo) {
+    // A margin with which everything is near everything.
+    const Solid ball = exact(shapes::icosphere(3)), sheet = exact(shapes::sheet(2, 2, 24), false);
+    QueryContext context;
+    ContactManifolds m;
+    for (const uint64_t most : {0, 1, 10, 100, 1000, 10000}) {
+        const QueryOptions options{.max_pair_tests = most, .margin = 100};
+        const ContactResult r = contacts(ball.view(), {}, sheet.view(), {{3, 0, 0}, {}}, m, context, options);
+        EXPECT_EQ(r.verdict, r.found > 0 ? Verdict::overlapping : Verdict::undecided);
+        EXPECT_LE(r.found, most);
+        const CollideAllResult all = collide_all(ball.view(), {}, sheet.view(), {{3, 0, 0}, {}}, {}, context, options);
+        EXPECT_LE(all.stats.tests(), most);
+        EXPECT_LE(all.found, most);
     }
 }
 
@@ -397,7 +513,7 @@ TEST(Contacts, ACubeOnItsCorner) {
     const ContactManifolds m = fresh(floor, {}, cube, {{-0.3466f, 0.3485f, 0.7101f}, {-0.1f, 0, -0.4f, -0.4f}});
     ASSERT_EQ(m.count, 1u);
     EXPECT_NEAR(m.manifolds[0].normal.z, 1, 1e-6);
-    EXPECT_NEAR(deepest_of(m), 0.00202, 1e-5);
+    EXPECT_NEAR(depth_of(m.manifolds[0]), 0.00202, 1e-5);
 }
 
 // ---- time ----

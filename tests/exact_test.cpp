@@ -9,9 +9,14 @@
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
 
+#include <prolate/bounds.hpp>
 #include <prolate/build.hpp>
 #include <prolate/collide.hpp>
+#include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
+#include <prolate/raycast.hpp>
+#include <prolate/shapes.hpp>
+#include <prolate/sweep.hpp>
 #include <prolate/verify.hpp>
 
 #include <gtest/gtest.h>
@@ -194,7 +199,7 @@ TEST(ExactTree, LeavesHoldSeveralTrianglesWhereThatIsCheaper) {
     // So many full nodes of 8 would lead down to single triangles.
     EXPECT_LT(inner, (built.tree.view().triangle_count() - 1) / 7);
     // The squares of other scales' widths are beyond a float: still the same tree, up to rounding.
-    for (const float scale : {1e-25f, 1e20f})
+    for (const float scale : {1e-24f, 1e20f})
         EXPECT_NEAR(inner_nodes(must_build(torus(scale)).tree.view()), inner, 0.02 * inner) << scale;
 }
 
@@ -202,6 +207,61 @@ TEST(ExactTree, EndsWhereTheFormatDoes) {
     BuildOptions options;
     options.degree = 2, options.leaf_triangles = 1;
     EXPECT_EQ(must_build(spiral(), options).tree.view().level_count(), kMaxLevels); // then parts are halved
+}
+
+TEST(ExactTree, CoordinatesHaveALimit) {
+    // At the limit everything is finite; beyond it, nothing is baked and nothing opened.
+    const auto sized = [](float half) { return shapes::moved(shapes::box(2, 2, 2), {-half, -half, -half}, half); };
+    const Mesh largest = sized(kLargestCoordinate);
+    const auto beyond = build(sized(kLargestCoordinate * 1.001f).view(), {.exact = true});
+    ASSERT_FALSE(beyond);
+    EXPECT_EQ(beyond.error().code, ErrorCode::bad_mesh);
+    EXPECT_EQ(std::string(beyond.error().what).substr(0, 6), "vertex");
+
+    const Build built = must_build(largest);
+    const TreeView tree = built.tree.view();
+    std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
+    const auto at = static_cast<size_t>(tree.vertex_bytes() - tree.bytes().data()) + 12 * 5;
+    for (const float bad : {3e38f, -kLargestCoordinate * 1.001f, std::numeric_limits<float>::infinity(),
+                            std::numeric_limits<float>::quiet_NaN()}) {
+        store_le(bytes.data() + at + 4, bad);
+        const auto opened = TreeView::open(bytes, {.check_hash = false});
+        ASSERT_FALSE(opened);
+        EXPECT_EQ(opened.error().where, at);
+    }
+
+    const Build ball = must_build(shapes::moved(shapes::icosphere(2), {}, kLargestCoordinate));
+    scenes::Random random(14);
+    QueryContext context;
+    for (const TreeView& other : {tree, ball.tree.view()})
+        for (int i = 0; i < 50; ++i) {
+            const Point d = random.direction();
+            const double t = double{kLargestCoordinate} * random.in(0, 4);
+            const Pose pose{scenes::to_float({t * d[0], t * d[1], t * d[2]}), random.rotation()};
+            const auto finite = [](const Vec3& v) {
+                return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+            };
+            const QueryOptions near{.margin = 0.1f * kLargestCoordinate};
+            ContactManifolds m;
+            const ContactResult touching = contacts(tree, {}, other, pose, m, context, near);
+            EXPECT_EQ(touching.verdict, collide(tree, {}, other, pose, context, near).verdict);
+            EXPECT_EQ(m.count > 0, touching.verdict == Verdict::overlapping && !touching.enclosed);
+            for (uint32_t k = 0; k < m.count; ++k)
+                for (uint32_t p = 0; p < m.manifolds[k].count; ++p) {
+                    const ContactPoint& point = m.manifolds[k].points[p];
+                    EXPECT_TRUE(finite(m.manifolds[k].normal) && finite(point.point_a) && finite(point.point_b) &&
+                                std::isfinite(point.depth));
+                }
+            const DistanceResult apart = distance(tree, {}, other, pose, context);
+            EXPECT_TRUE(std::isfinite(apart.lower) && std::isfinite(apart.upper));
+            const float far = 3 * kLargestCoordinate;
+            const SweepResult swept = sweep(tree, {}, other, {pose, {far, -far, far}, {1, 2, 3}, {}}, context);
+            EXPECT_NE(swept.verdict, Verdict::undecided);
+            EXPECT_TRUE(std::isfinite(swept.distance) && finite(swept.point_a) && finite(swept.normal));
+            const RaycastResult hit = raycast(other, pose, {{}, scenes::to_float(random.direction())}, context);
+            EXPECT_EQ(std::isfinite(hit.t) && finite(hit.point), hit.verdict == Verdict::overlapping);
+            EXPECT_NE(overlap(other, pose, Sphere{{}, kLargestCoordinate}, context).verdict, Verdict::undecided);
+        }
 }
 
 TEST(ExactTree, OptionsAreChecked) {
@@ -788,6 +848,51 @@ TEST(ExactQuery, ABudgetIsExactAndDeeperNeverRevokesSeparated) {
                 }
                 ASSERT_EQ(before, full.verdict);
             }
+}
+
+// ---- boxes ----
+
+// How much longer than the least one a side of the body's box is, at most; below 0 if it does not hold the body.
+double longer_than_need_be(const TreeView& tree, const Pose& pose) {
+    const auto rows = scenes::rotation_rows(pose.rotation);
+    const Bounds box = bounds(tree, pose);
+    const double lower[] = {box.lower.x, box.lower.y, box.lower.z}, upper[] = {box.upper.x, box.upper.y, box.upper.z};
+    double longest = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        double least = HUGE_VAL, most = -HUGE_VAL;
+        for (uint32_t v = 0; v < tree.vertex_count(); ++v) { // each belongs to a triangle
+            const Vec3 p = tree.vertex(v);
+            const double at = rows[k][0] * p.x + rows[k][1] * p.y + rows[k][2] * p.z;
+            least = std::min(least, at), most = std::max(most, at);
+        }
+        if (lower[k] > least || upper[k] < most) return -1;
+        longest = std::max(longest, (upper[k] - lower[k]) / (most - least) - 1);
+    }
+    return longest;
+}
+
+TEST(ExactBoxes, AreWithinAPercentOfTheLeastOnes) {
+    const std::pair<const char*, Mesh> meshes[] = {
+        {"cube", shapes::box()},
+        {"plate", shapes::box(10, 10, 0.001f)},
+        {"ball", shapes::icosphere(4)},
+        {"torus", shapes::torus(1, 0.3f, 60, 30)},
+        {"far", shapes::moved(shapes::torus(1, 0.3f, 40, 20), {300, -200, 100})},
+        {"pieces", shapes::two_pieces()},
+        {"spiral", spiral()}};
+    scenes::Random random(1);
+    for (const auto& [name, mesh] : meshes) {
+        SCOPED_TRACE(name);
+        const Build built = must_build(mesh);
+        for (int i = 0; i < 200; ++i) {
+            const double by =
+                longer_than_need_be(built.tree.view(), {{}, i == 0 ? Quat{0, 0, 0, 1} : random.rotation()});
+            EXPECT_GE(by, 0);
+            EXPECT_LT(by, 0.01);
+        }
+    }
+    const Build sheet = must_build(shapes::sheet(1, 1, 40));
+    for (int i = 0; i < 200; ++i) EXPECT_LT(longer_than_need_be(sheet.tree.view(), {{}, random.rotation()}), 0.01);
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 #include "cli/export_formats.hpp"
 #include "cli/export_sphere.hpp"
 #include "cli/render_palette.hpp"
+#include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 
 #include <prolate/mesh.hpp>
@@ -37,6 +38,7 @@ using namespace prolate;
 using namespace prolate::cli;
 using glm::dmat3;
 using glm::dvec3;
+using reference::operator*;
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
@@ -216,8 +218,11 @@ void expect_all_used(const Json& gltf) {
 
 TEST_F(Export, GlbIsWhatTheSpecificationAsksFor) {
     const std::vector<Piece> pieces = some_pieces(100);
-    for (const uint32_t segments : {4u, 32u, 100u, kMaxSegments}) {
-        const Chunks glb = open_glb(as_glb(pieces, segments));
+    for (const auto& [segments, facets] : {std::pair{4u, Facets::inscribed},
+                                           {32u, Facets::outer},
+                                           {100u, Facets::inscribed},
+                                           {kMaxSegments, Facets::outer}}) {
+        const Chunks glb = open_glb(as_glb(pieces, segments, facets));
         expect_sound_buffers(glb);
         const Json& gltf = glb.gltf;
         expect_all_used(gltf);
@@ -269,13 +274,13 @@ TEST_F(Export, GlbIsWhatTheSpecificationAsksFor) {
 }
 
 TEST_F(Export, AChangedByteOfAGlbIsFound) { // the check above is no formality
-    Chunks glb = open_glb(as_glb(some_pieces(3), 8));
+    Chunks glb = open_glb(as_glb(some_pieces(3), 8, Facets::inscribed));
     glb.binary[3] = static_cast<char>(0x7e); // of the first coordinate, now 4e37
     EXPECT_NONFATAL_FAILURE(expect_sound_buffers(glb), "max");
 }
 
 TEST_F(Export, AnUnusedMaterialOfAGlbIsFound) {
-    Json gltf = open_glb(as_glb(some_pieces(3), 8)).gltf;
+    Json gltf = open_glb(as_glb(some_pieces(3), 8, Facets::inscribed)).gltf;
     gltf["materials"].push_back(gltf["materials"][0]);
     EXPECT_NONFATAL_FAILURE(expect_all_used(gltf), "materials");
 }
@@ -283,7 +288,8 @@ TEST_F(Export, AnUnusedMaterialOfAGlbIsFound) {
 TEST_F(Export, AssimpFindsEveryEllipsoidInTheGlb) {
     const std::vector<Piece> pieces = some_pieces(200);
     Assimp::Importer importer;
-    const aiScene* scene = importer.ReadFile(file("a.glb", as_glb(pieces, 16)), aiProcess_ValidateDataStructure);
+    const aiScene* scene =
+        importer.ReadFile(file("a.glb", as_glb(pieces, 16, Facets::inscribed)), aiProcess_ValidateDataStructure);
     ASSERT_NE(scene, nullptr) << importer.GetErrorString();
     for (const Piece& piece : pieces) {
         SCOPED_TRACE(piece.node);
@@ -339,11 +345,12 @@ void expect_meshes(const Mesh& all, const std::vector<Piece>& pieces, size_t tri
 
 TEST_F(Export, PlyAndObjHoldTheEllipsoids) {
     const std::vector<Piece> pieces = some_pieces(20);
-    for (const auto& [name, content] : {std::pair{"a.ply", as_ply(pieces, 30)}, {"a.obj", as_obj(pieces, 30)}}) {
+    for (const auto& [name, content] : {std::pair{"a.ply", as_ply(pieces, 30, Facets::inscribed)},
+                                        {"a.obj", as_obj(pieces, 30, Facets::inscribed)}}) {
         SCOPED_TRACE(name);
-        std::string detail;
-        const auto mesh = load_mesh(file(name, content).c_str(), &detail);
-        ASSERT_TRUE(mesh) << mesh.error().what << detail;
+        ImportReport report;
+        const auto mesh = load_mesh(file(name, content).c_str(), {}, &report);
+        ASSERT_TRUE(mesh) << mesh.error().what << report.detail;
         expect_meshes(*mesh, pieces, 32 * 32 / 2);
     }
 }
@@ -351,7 +358,8 @@ TEST_F(Export, PlyAndObjHoldTheEllipsoids) {
 TEST_F(Export, ColoursOfPlyAndObjAreThePieces) {
     const std::vector<Piece> pieces = some_pieces(20);
     const auto encoded = [](const dvec3& c) { return dvec3(srgb_encode(c.x), srgb_encode(c.y), srgb_encode(c.z)); };
-    for (const auto& [name, content] : {std::pair{"a.ply", as_ply(pieces, 8)}, {"a.obj", as_obj(pieces, 8)}}) {
+    for (const auto& [name, content] :
+         {std::pair{"a.ply", as_ply(pieces, 8, Facets::inscribed)}, {"a.obj", as_obj(pieces, 8, Facets::inscribed)}}) {
         SCOPED_TRACE(name);
         Assimp::Importer importer;
         const aiScene* scene = importer.ReadFile(file(name, content), 0);
@@ -377,6 +385,151 @@ TEST_F(Export, ColoursOfPlyAndObjAreThePieces) {
     }
 }
 
+// ---- outer facets ----
+
+// Each piece in turn is a closed mesh of `triangles` triangles around its center, none of which enters the ellipsoid:
+// the mesh holds it. Returns how many times larger than the ellipsoid a mesh is, at most.
+double expect_to_hold(const Mesh& all, const std::vector<Piece>& pieces, size_t triangles) {
+    EXPECT_EQ(all.triangles.size(), triangles * pieces.size());
+    double largest = 0;
+    for (size_t i = 0; i < pieces.size(); ++i) {
+        SCOPED_TRACE(pieces[i].node);
+        const Ellipsoid& e = pieces[i].shape;
+        Mesh one{all.vertices, {}};
+        one.triangles.assign(all.triangles.begin() + static_cast<ptrdiff_t>(i * triangles),
+                             all.triangles.begin() + static_cast<ptrdiff_t>((i + 1) * triangles));
+        const auto cleaned = clean(one.view());
+        EXPECT_TRUE(cleaned && cleaned->report.closed);
+        long double six = 0;
+        uint32_t entering = 0;
+        for (const Triangle& t : one.triangles) {
+            const auto corners =
+                reference::placed({one.vertices[t[0]], one.vertices[t[1]], one.vertices[t[2]]}, {}, e.center);
+            entering += !(reference::radius(corners, e, {}, e.center) >= 1);
+            six += reference::dot(corners[0], reference::cross(corners[1], corners[2]));
+        }
+        EXPECT_EQ(entering, 0u);
+        largest = std::max(largest, static_cast<double>(six / 6 / volume(e)));
+    }
+    return largest;
+}
+
+// As some_pieces(), and such as single precision can hardly tell from points where they are.
+std::vector<Piece> hard_pieces() {
+    std::vector<Piece> pieces = some_pieces(12);
+    pieces.push_back({900, {{1000, -3000, 0.5f}, 1e-3f, 0, 2e-3f, 0, 0, 1e-3f}, {}});
+    pieces.push_back({901, {{1, 1, 1}, 1, 0.7f, 1e-3f, -0.3f, 0.2f, 1e-4f}, {}});
+    pieces.push_back({902, {{0, 0, 0}, 1e-20f, 0, 2e-20f, 0, 0, 1e-20f}, {}});
+    return pieces;
+}
+
+TEST_F(Export, OuterMeshesHoldTheEllipsoids) {
+    for (const uint32_t segments : {4u, 12u, 32u}) {
+        for (const auto& [name, content] : {std::pair{"a.ply", as_ply(hard_pieces(), segments, Facets::outer)},
+                                            {"a.obj", as_obj(hard_pieces(), segments, Facets::outer)}}) {
+            SCOPED_TRACE(name);
+            std::string detail;
+            const auto mesh = load_mesh(file(name, content).c_str(), &detail);
+            ASSERT_TRUE(mesh) << mesh.error().what << detail;
+            expect_to_hold(*mesh, hard_pieces(), segments * segments / 2);
+        }
+        const std::vector<Piece> pieces = some_pieces(12);
+        const auto mesh = load_mesh(file("b.ply", as_ply(pieces, segments, Facets::outer)).c_str());
+        const double larger = expect_to_hold(*mesh, pieces, segments * segments / 2);
+        EXPECT_LT(larger, segments == 4 ? 1.66 : segments == 12 ? 1.1 : 1.013);
+    }
+}
+
+TEST_F(Export, TheCheckAboveNoticesCornersOnTheEllipsoids) {
+    const std::vector<Piece> pieces = some_pieces(1);
+    const auto mesh = load_mesh(file("a.ply", as_ply(pieces, 32, Facets::inscribed)).c_str());
+    EXPECT_NONFATAL_FAILURE(expect_to_hold(*mesh, pieces, 512), "entering");
+}
+
+TEST_F(Export, AnOuterObjIsOneObjectForSimulators) {
+    std::istringstream lines(as_obj(some_pieces(3), 8, Facets::outer));
+    std::set<std::string> words;
+    for (std::string line; std::getline(lines, line);) {
+        words.insert(line.substr(0, line.find(' ')));
+        if (line[0] == 'v') {
+            EXPECT_EQ(std::count(line.begin(), line.end(), ' '), 3) << line;
+        }
+    }
+    EXPECT_EQ(words, (std::set<std::string>{"#", "v", "f"}));
+}
+
+// Assimp places the nodes in single precision.
+TEST_F(Export, AnOuterGlbHoldsTheEllipsoidsAsReadersPlaceThem) {
+    std::vector<Piece> pieces = hard_pieces();
+    std::erase_if(pieces, [](const Piece& p) { return p.shape.l11 < 1e-10f; }); // Assimp loses such
+    Assimp::Importer importer;
+    const aiScene* scene =
+        importer.ReadFile(file("a.glb", as_glb(pieces, 32, Facets::outer)), aiProcess_ValidateDataStructure);
+    ASSERT_NE(scene, nullptr) << importer.GetErrorString();
+    double largest = 0;
+    for (const Piece& piece : pieces) {
+        const aiNode* node = scene->mRootNode->FindNode(("node " + std::to_string(piece.node)).c_str());
+        ASSERT_NE(node, nullptr);
+        const aiMesh& sphere = *scene->mMeshes[node->mMeshes[0]];
+        Mesh mesh;
+        for (uint32_t i = 0; i < sphere.mNumVertices; ++i) {
+            const aiVector3D v = node->mTransformation * sphere.mVertices[i];
+            mesh.vertices.push_back({v.x, v.y, v.z});
+            EXPECT_NEAR(sphere.mNormals[i].Length(), 1, 1e-6);
+        }
+        for (uint32_t i = 0; i < sphere.mNumFaces; ++i) {
+            const unsigned* const f = sphere.mFaces[i].mIndices;
+            mesh.triangles.push_back({f[0], f[1], f[2]});
+        }
+        const double larger = expect_to_hold(mesh, {piece}, 512);
+        if (piece.node < 900) largest = std::max(largest, larger);
+    }
+    EXPECT_LT(largest, 1.06);
+}
+
+// ---- csv and json ----
+
+// What a reader makes of center, radii and rotation, in double precision, holds the decoded ellipsoid; and what is
+// single precision is exact.
+TEST_F(Export, TablesHoldTheEllipsoids) {
+    scenes::Random random(11);
+    const auto scene = scenes::tree(random, scenes::cloud(random, 400), {});
+    const TreeView tree = *TreeView::open(scene.bytes);
+    const uint32_t last = tree.level_count() - 1;
+    Selection cut;
+    tree.for_each_in_cut(last, [&](uint32_t node) { cut.nodes.push_back(node), cut.levels.push_back(last); });
+    std::istringstream csv(as_csv(tree, cut));
+    const Json json = Json::parse(as_json(tree, cut));
+    EXPECT_TRUE(json["precision"].contains("radii"));
+    std::string line;
+    std::getline(csv, line);
+    double most = 0;
+    for (size_t i = 0; i < cut.nodes.size(); ++i) {
+        const Ellipsoid e = tree.ellipsoid(cut.nodes[i]);
+        std::getline(csv, line);
+        std::vector<double> row;
+        std::istringstream cells(line);
+        for (std::string cell; std::getline(cells, cell, ',');) row.push_back(std::stod(cell));
+        ASSERT_EQ(row.size(), 16u);
+        const Json& node = json["nodes"][i];
+        EXPECT_EQ(node["center"], Json::array({row[1], row[2], row[3]}));
+        EXPECT_EQ(node["radii"], Json::array({row[4], row[5], row[6]}));
+        EXPECT_EQ(row[1], e.center.x);
+        EXPECT_EQ(row[3], e.center.z);
+        EXPECT_EQ(node["factor"], Json::array({e.l11, e.l21, e.l22, e.l31, e.l32, e.l33}));
+        const reference::Matrix factor{{{e.l11, 0, 0}, {e.l21, e.l22, 0}, {e.l31, e.l32, e.l33}}};
+        reference::Matrix axes; // R diag(r)
+        for (size_t k = 0; k < 9; ++k) axes[k / 3][k % 3] = static_cast<long double>(row[7 + k]) * row[4 + k % 3];
+        const reference::Matrix g = reference::inverse(axes) * factor;
+        const auto squares = reference::eigen(g * reference::transposed(g)).first;
+        for (const long double square : squares) {
+            EXPECT_LE(square, 1);
+            most = std::max(most, static_cast<double>(1 - square));
+        }
+    }
+    EXPECT_LT(most, 1e-10);
+}
+
 // ---- pov ----
 
 TEST_F(Export, PovHoldsEachEllipsoidToTheBit) {
@@ -389,7 +542,10 @@ TEST_F(Export, PovHoldsEachEllipsoidToTheBit) {
         EXPECT_EQ((*at)[3], std::to_string(pieces[found].node));
         std::vector<float> m;
         std::istringstream numbers((*at)[1]);
-        for (std::string number; std::getline(numbers, number, ',');) m.push_back(std::stof(number));
+        for (std::string number; std::getline(numbers, number, ',');) {
+            m.push_back(std::stof(number));
+            EXPECT_EQ(std::stod(number), m.back()) << "exact in either precision";
+        }
         ASSERT_EQ(m.size(), 12u);
         // Rows are the images of the axes: the columns of the factor.
         EXPECT_EQ((Ellipsoid{{m[9], m[10], m[11]}, m[0], m[1], m[4], m[2], m[5], m[8]}), pieces[found].shape);

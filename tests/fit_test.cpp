@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include <cmath>
@@ -52,7 +53,10 @@ TEST(Fit, StartsFromAFlatTetrahedron) {
                                   {0.034772001206874847, 0.022973500192165375, 0.0025349999777972698}};
     const Fit fit = enclosing_ellipsoid(points, 1e-6);
     EXPECT_LE(fit.reach(points), 1 + 1e-9);
-    EXPECT_LE(fit.half_extents().maxCoeff(), 1.1e-3);
+    Mat edges;
+    for (int i = 0; i < 3; ++i) edges.col(i) = points[size_t(i)] - points[3];
+    const double volume = std::abs(edges.determinant()) / 6;
+    EXPECT_LE(fit.volume(), 1.01 * volume * std::numbers::pi / 2 * std::pow(3, 1.5)); // as of any tetrahedron
 }
 
 TEST(Fit, EnclosesWhateverItIsGiven) {
@@ -85,12 +89,12 @@ TEST(Capped, KeepsToTheCapsAndWithinCapsSaysSo) {
     int changed = 0;
     for (int round = 0; round < 2000; ++round) {
         const Vec axis = random_vec(random).normalized();
-        const double unit = std::pow(10.0, 12 * random.uniform() - 6), flat = std::pow(10.0, -8 * random.uniform());
+        const double unit = std::pow(10.0, 12 * random.uniform() - 6), flat = std::pow(10.0, -14 * random.uniform());
         const Mat q = unit * unit * (Mat::Identity() - (1 - flat) * axis * axis.transpose());
-        const Fit raw(Vec::Zero(), cholesky(q)), fit = capped(Vec::Zero(), q, 1e-2 * unit);
-        EXPECT_TRUE(within_caps(fit, 1e-2 * unit));
+        const Fit raw(Vec::Zero(), cholesky(q)), fit = capped(Vec::Zero(), q, 1e-6 * unit, kMaxAxisRatio);
+        EXPECT_TRUE(within_caps(fit, 1e-6 * unit, kMaxAxisRatio));
         const bool legal = flat * kMaxAxisRatio * kMaxAxisRatio >= 1;
-        EXPECT_EQ(within_caps(raw, 1e-2 * unit), legal);
+        EXPECT_EQ(within_caps(raw, 1e-6 * unit, kMaxAxisRatio), legal);
         if (legal) {
             EXPECT_EQ(fit.factor, raw.factor);
         }
@@ -141,6 +145,44 @@ TEST(Cover, DecodedNodesCoverWithLittleWaste) {
                 EXPECT_LE(decoded.volume(), fit.volume() * 1.02);
             }
         }
+    }
+}
+
+// A rotation about a random axis: by a random angle, or by a small one, so that the axes nearly keep to the lattice's.
+Mat random_attitude(Random& random, int kind) {
+    const double angle = kind == 0 ? 0 : kind == 1 ? std::pow(10, -6 * random.uniform()) : 4 * random.uniform();
+    return Eigen::AngleAxisd(angle, random_vec(random).normalized()).toRotationMatrix();
+}
+
+// A sheet, a blade or a needle, as a node that covers its corners.
+double outside_ratio_of_box(const Vec& half, const Mat& attitude, const format::Lattice& lattice, const Vec& center) {
+    std::vector<Vec> corners;
+    for (unsigned i = 0; i < 8; ++i)
+        corners.push_back(center + attitude * Vec(i & 1 ? half.x() : -half.x(), i & 2 ? half.y() : -half.y(),
+                                                  i & 4 ? half.z() : -half.z()));
+    const auto reach = [&](const Fit& fit) { return fit.reach(corners); };
+    const auto node = covering_node(enclosing_ellipsoid(corners, 1e-6), lattice, reach);
+    if (!node) return HUGE_VAL;
+    const Fit decoded(format::decode(*node, lattice));
+    EXPECT_LE(decoded.reach(corners), 1);
+    return decoded.volume() / (8 * half.prod()) - 1;
+}
+
+// The minimum ellipsoid of any box has pi sqrt(3) / 2 times its volume.
+constexpr double kBoxInEllipsoid = std::numbers::pi * std::numbers::sqrt3 / 2 - 1; // 1.72
+
+TEST(Cover, ThinBoxesHaveThinNodesInAnyAttitude) {
+    Random random(17);
+    for (int round = 0; round < 1500; ++round) {
+        const double thin = std::pow(10, -4 * (round % 5 == 0 ? 1 : random.uniform()));
+        const double other = round % 3 == 0 ? thin : round % 3 == 1 ? 1 : std::sqrt(thin);
+        const Vec half(1, other, thin);
+        const Mat attitude = random_attitude(random, round % 4) * random_attitude(random, round % 4);
+        const Vec size = attitude.cwiseAbs() * half, low = Vec(0, 0, 0), high = Vec(0, 0, 0);
+        const auto lattice = format::lattice_for(low.data(), high.data(), size.maxCoeff()); // as for a single node
+        EXPECT_LE(outside_ratio_of_box(half, attitude, lattice, Vec::Zero()), 1.1 * kBoxInEllipsoid)
+            << "1 x " << other << " x " << thin << "\n"
+            << attitude;
     }
 }
 

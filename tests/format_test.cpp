@@ -36,8 +36,8 @@ using scenes::Random;
 using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
-constexpr size_t kTable = 144, kRow = 60;
-constexpr size_t kBounding = 384; // of the golden tree: 144 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kTable = 200, kRow = 60;
+constexpr size_t kBounding = 384; // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
 constexpr size_t kBlocks = kBounding + 2 * 256; // of the exact one, which has no bounding blocks, kBounding
 constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
 constexpr size_t kExactBlock1 = kBounding + 256, kExactBlock2 = kExactBlock1 + 256, kExactEnd = kExactBlock2 + 256;
@@ -90,7 +90,9 @@ BakeInfo golden_info() {
             .levels = 2,
             .ellipsoids = 9,
             .seed = 42,
-            .resolution = 96};
+            .resolution = 96,
+            .placement = {{0.001, -0.001, 0.001}, {500000, -0.5, 5400000}},
+            .weld = 0.0625f};
 }
 Bytes golden() {
     return format::encode(golden_info(), 3, kGoldenLattice, golden_levels());
@@ -243,7 +245,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
         info.exact = true;
         PackedLevel root{{{.triangle_count = 1}}};
         const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
-        EXPECT_EQ(bytes.size(), 256 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        EXPECT_EQ(bytes.size(), 320 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
         const auto tree = TreeView::open(bytes);
         ASSERT_TRUE(tree) << tree.error().what;
         EXPECT_EQ(tree->triangle(0), triangle);
@@ -268,21 +270,21 @@ TEST(Format, GoldenFileOfVersionFive) {
     EXPECT_EQ(tree->level_count(), 3u);
     EXPECT_EQ(tree->degree(), 3u);
     EXPECT_FALSE(tree->is_prefix());
-    // By hand: (origin + q) / 16, d 2^(e - 16), o 2^(e - 15).
+    // By hand: (origin + q) / 16, d^2 2^(e - 30), o |o| 2^(e - 30).
     EXPECT_EQ(tree->ellipsoid(0), (Ellipsoid{{-20 / 16.f, 27 / 16.f, 1030 / 16.f},
-                                             40000 / 32768.f,
-                                             -1000 / 16384.f,
-                                             50000 / 32768.f,
-                                             2000 / 16384.f,
-                                             -3000 / 16384.f,
-                                             60000 / 32768.f}));
+                                             4e4f * 4e4f * 0x1p-29f,
+                                             -1e3f * 1e3f * 0x1p-29f,
+                                             5e4f * 5e4f * 0x1p-29f,
+                                             2e3f * 2e3f * 0x1p-29f,
+                                             -3e3f * 3e3f * 0x1p-29f,
+                                             6e4f * 6e4f * 0x1p-29f}));
     EXPECT_EQ(tree->ellipsoid(8), (Ellipsoid{{-30 / 16.f, 7 / 16.f, 1000 / 16.f},
-                                             1 / 65536.f,
-                                             32767 / 32768.f,
-                                             2 / 65536.f,
+                                             0x1p-30f,
+                                             32767.f * 32767.f * 0x1p-30f,
+                                             4 * 0x1p-30f,
                                              -1.f,
                                              0.f,
-                                             65535 / 65536.f}));
+                                             65535.f * 65535.f * 0x1p-30f}));
     EXPECT_EQ(tree->children(0).first, 8u);
     EXPECT_EQ(tree->children(8).first, 16u);
     EXPECT_EQ(tree->children(8).count, 3u);
@@ -311,6 +313,8 @@ TEST(Format, GoldenFileOfVersionFive) {
     EXPECT_EQ(info.goal_reached, expected.goal_reached);
     EXPECT_EQ(info.solid_volume, expected.solid_volume);
     EXPECT_EQ(info.solid_volume_error, expected.solid_volume_error);
+    EXPECT_EQ(info.placement, expected.placement);
+    EXPECT_EQ(info.weld, expected.weld);
     EXPECT_EQ(info.diagonal, expected.diagonal);
     EXPECT_EQ(info.method, expected.method);
     EXPECT_EQ(info.quality, expected.quality);
@@ -384,13 +388,16 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "golden_v4.etree");
-    ASSERT_FALSE(file.empty());
-    for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
-        const auto tree = TreeView::open(file, options);
-        ASSERT_FALSE(tree);
-        EXPECT_EQ(tree.error().code, ErrorCode::bad_file);
-        EXPECT_STREQ(tree.error().what, "written by an older format version than this library reads");
+    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree",
+                             "golden_v3_exact.etree", "golden_v4.etree", "golden_v4_exact.etree"}) {
+        const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
+        ASSERT_FALSE(file.empty());
+        for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
+            const auto tree = TreeView::open(file, options);
+            ASSERT_FALSE(tree);
+            EXPECT_EQ(tree.error().code, ErrorCode::bad_file);
+            EXPECT_STREQ(tree.error().what, "written by an older format version than this library reads");
+        }
     }
 }
 
@@ -485,7 +492,8 @@ TEST(Format, NamesTheFirstOffence) {
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
         {8, {4}, ErrorCode::bad_file, 8},
-        {kBlocks + 144, {19}, ErrorCode::bad_file, kBlocks + 144},         // 23 above the step exponent, -4
+        {kBlocks + 144, {18}, ErrorCode::bad_file, kBlocks + 144},         // 22 above the step exponent, -4
+        {kBlocks + 144, {0xdd}, ErrorCode::bad_file, kBlocks + 144},       // 31 below
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
         {8, {6}, ErrorCode::newer_version, 6},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
@@ -514,6 +522,11 @@ TEST(Format, NamesTheFirstOffence) {
         {128, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 128},  // infinite diagonal
         {136, {0, 0, 0x80, 0xbf}, ErrorCode::bad_file, 136},              // negative error
         {140, {0, 0, 0xc0, 0x7f}, ErrorCode::bad_file, 140},              // distance not a number
+        {152, {0, 0, 0, 0, 0, 0, 0, 0x80}, ErrorCode::bad_file, 152},     // a scale of 0
+        {160, {0, 0, 0, 0, 0, 0, 0xf8, 0x7f}, ErrorCode::bad_file, 160},  // a scale that is no number
+        {184, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 184},  // an infinite mesh origin
+        {192, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, 192},              // an infinite weld
+        {196, {1}, ErrorCode::bad_file, 196},                             // reserved
         {kTable, {1}, ErrorCode::bad_file, kTable},                       // first block of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
@@ -525,7 +538,7 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
         {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
-        {kBounding - 60, {1}, ErrorCode::bad_file, kBounding - 60},             // padding
+        {kBounding - 4, {1}, ErrorCode::bad_file, kBounding - 4},             // padding
         {kBounding - 1, {1}, ErrorCode::bad_file, kBounding - 1},
         {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 160},       // other children than in the block
         {kBounding + 160, {16}, ErrorCode::bad_file, kBounding + 160},      // another first child
@@ -593,7 +606,7 @@ TEST(Format, DecodingIsExact) {
             o = static_cast<int32_t>(random.below(2 * format::kMaxCoordinate - 65536)) - format::kMaxCoordinate + 1;
         lattice.step_exponent = static_cast<int32_t>(random.below(181)) - 120;
         PackedNode node;
-        node.exponent = static_cast<int8_t>(static_cast<int>(random.below(201)) - 100);
+        node.exponent = static_cast<int8_t>(static_cast<int>(random.below(191)) - 90);
         for (size_t k = 0; k < 3; ++k) {
             node.center[k] = bits16();
             node.diagonal[k] = std::max<uint16_t>(1, bits16());
@@ -604,8 +617,10 @@ TEST(Format, DecodingIsExact) {
                     off[3] = {e.l21, e.l31, e.l32};
         for (size_t k = 0; k < 3; ++k) {
             ASSERT_EQ(center[k], std::ldexp(1.0 * lattice.origin[k] + node.center[k], lattice.step_exponent));
-            ASSERT_EQ(diagonal[k], std::ldexp(1.0 * node.diagonal[k], node.exponent - 16));
-            ASSERT_EQ(off[k], std::ldexp(1.0 * node.off_diagonal[k], node.exponent - 15));
+            // One rounding, to a float.
+            const auto d = static_cast<float>(node.diagonal[k]), o = static_cast<float>(node.off_diagonal[k]);
+            ASSERT_EQ(diagonal[k], std::ldexp(d * d, node.exponent - 30));
+            ASSERT_EQ(off[k], std::ldexp(o * std::abs(o), node.exponent - 30));
         }
     }
 }
@@ -637,16 +652,17 @@ TEST(Format, QuantisingTakesTheNearest) {
         const Ellipsoid e = format::decode(node, lattice);
         const float decoded[3] = {e.center.x, e.center.y, e.center.z};
         for (size_t k = 0; k < 3; ++k) ASSERT_LE(std::abs(decoded[k] - center[k]), step / 2) << i;
-        const double unit = std::ldexp(1, node.exponent - 16);
+        const double unit = std::ldexp(1, node.exponent - 30);
         const float decoded_factor[6] = {e.l11, e.l21, e.l22, e.l31, e.l32, e.l33};
         double largest = 0;
         for (size_t k = 0; k < 6; ++k) {
             const bool diagonal = k == 0 || k == 2 || k == 5;
-            largest = std::max(largest, std::abs(factor[k]));
-            const double error = std::abs(decoded_factor[k] - factor[k]);
-            ASSERT_LE(error, diagonal && factor[k] < unit ? unit : diagonal ? unit / 2 : unit) << i;
+            largest = std::max(largest, std::abs(factor[k]) / (diagonal ? 4 : 1));
+            const double error = std::abs(decoded_factor[k] - factor[k]), root = std::sqrt(std::abs(factor[k]) / unit);
+            // Half of the gap between two squares; the least integer of the diagonal is 1.
+            ASSERT_LE(error, (root < 1 && diagonal ? 1 : root + 0.5001) * unit + 0x1p-24 * std::abs(factor[k])) << i;
         }
-        ASSERT_LE(unit, std::max(largest, 0x1p-100) * 0x1p-15 * 1.0001) << i; // 16 bits are used
+        ASSERT_LE(unit, std::max(largest, 0x1p-90) * 0x1p-29 * 1.001) << i; // 16 bits are used
         // The lattice is no coarser than 16 bits across or 24 bits from zero ask for.
         double extent = 0, reach = 0;
         for (size_t k = 0; k < 3; ++k) {

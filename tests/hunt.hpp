@@ -65,9 +65,10 @@ inline Real length(const Vector& v) {
     return std::sqrt(reference::dot(v, v));
 }
 
-/// Radii with the largest 1: needles, discs and anything between, up to the axis ratio of 1000 that bakes keep.
+/// Radii with the largest 1: needles, discs and anything between, up to twice the axis ratio that bakes keep.
+inline constexpr double kLargestRatio = 32768;
 inline Point radii(Random& random) {
-    const double thin = 1 / random.log_in(1, 1000);
+    const double thin = 1 / random.log_in(1, kLargestRatio);
     Point r{};
     switch (random.below(3)) {
     case 0:
@@ -77,10 +78,10 @@ inline Point radii(Random& random) {
         r = {1, random.in(0.5, 1), thin};
         break;
     default:
-        r = scenes::radii(random, random.log_in(1, 1000));
+        r = scenes::radii(random, random.log_in(1, kLargestRatio));
         break;
     }
-    for (double& x : r) x = std::clamp(x, 1e-3, 1.0);
+    for (double& x : r) x = std::clamp(x, 1 / kLargestRatio, 1.0);
     std::swap(r[0], r[random.below(3)]);
     return r;
 }

@@ -8,12 +8,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
+#include <utility>
 
 #include <unistd.h>
 
@@ -68,9 +72,12 @@ protected:
         return path;
     }
     Mesh load(const std::string& path) const {
-        std::string detail;
-        auto mesh = load_mesh(path.c_str(), &detail);
-        EXPECT_TRUE(mesh) << path << ": " << (mesh ? "" : mesh.error().what) << ' ' << detail;
+        ImportReport report;
+        return load(path, {}, report);
+    }
+    Mesh load(const std::string& path, const ImportOptions& options, ImportReport& report) const {
+        auto mesh = load_mesh(path.c_str(), options, &report);
+        EXPECT_TRUE(mesh) << path << ": " << (mesh ? "" : mesh.error().what) << ' ' << report.detail;
         return mesh ? std::move(*mesh) : Mesh{};
     }
     void expect_tetrahedron(const std::string& path) const {
@@ -86,12 +93,12 @@ protected:
                 << path << ": coordinates stay as the file has them";
     }
     void expect_refused(const std::string& path, ErrorCode code, const std::string& words) const {
-        std::string detail;
-        const auto mesh = load_mesh(path.c_str(), &detail);
+        ImportReport report;
+        const auto mesh = load_mesh(path.c_str(), {}, &report);
         ASSERT_FALSE(mesh) << path;
         EXPECT_EQ(mesh.error().code, code) << path << ": " << mesh.error().what;
-        EXPECT_NE((mesh.error().what + (" " + detail)).find(words), std::string::npos)
-            << path << ": " << mesh.error().what << " / " << detail;
+        EXPECT_NE((mesh.error().what + (" " + report.detail)).find(words), std::string::npos)
+            << path << ": " << mesh.error().what << " / " << report.detail;
     }
 
     fs::path folder_;
@@ -212,18 +219,19 @@ TEST_F(Import, RefusesWhatAssimpWouldBend) {
 }
 
 TEST_F(Import, RefusesWhatIsNoFile) {
-    std::string detail = "old";
-    auto mesh = load_mesh((folder_ / "missing.obj").c_str(), &detail);
+    ImportReport report{"old", {"old"}};
+    auto mesh = load_mesh((folder_ / "missing.obj").c_str(), {}, &report);
     ASSERT_FALSE(mesh);
     EXPECT_EQ(mesh.error().code, ErrorCode::io);
     EXPECT_EQ(mesh.error().where, static_cast<uint64_t>(ENOENT));
-    EXPECT_EQ(detail, "");
+    EXPECT_EQ(report.detail, "");
+    EXPECT_TRUE(report.notes.empty());
     fs::create_directory(folder_ / "folder.obj");
     mesh = load_mesh((folder_ / "folder.obj").c_str());
     ASSERT_FALSE(mesh);
     EXPECT_EQ(mesh.error().code, ErrorCode::io);
     EXPECT_EQ(mesh.error().where, static_cast<uint64_t>(EISDIR));
-    for (const char* name : {"e.obj", "e.ply", "e.stl", "e.off", "e.gltf", "e.glb", "e.3ds", "e.dae"})
+    for (const char* name : {"e.obj", "e.ply", "e.stl", "e.off", "e.gltf", "e.glb", "e.3mf", "e.3ds", "e.dae"})
         expect_refused(write(name, ""), ErrorCode::bad_file, "empty");
     expect_refused(write("mesh.xyz", kObj), ErrorCode::bad_file, "unknown kind");
     expect_refused(write("mesh", kObj), ErrorCode::bad_file, "unknown kind");
@@ -315,12 +323,468 @@ TEST_F(Import, GltfWithAShortBufferIsRefused) {
     expect_refused(path, ErrorCode::bad_file, "");
 }
 
+// ---- polygons ----
+
+// A comb of four teeth, extruded: two concave caps of 16 corners, and sides of 4.
+struct Comb {
+    std::vector<std::array<double, 3>> vertices;
+    std::vector<std::vector<uint32_t>> faces;
+    double volume = 0;
+};
+Comb comb(double angle) {
+    std::vector<std::array<double, 2>> p = {{0, 0}, {7, 0}};
+    for (int t = 3; t >= 0; --t) {
+        const double h = 1 + 0.5 * ((3 * t) % 4);
+        p.push_back({2. * t + 1, h}), p.push_back({2. * t, h});
+        if (t > 0) p.push_back({2. * t, 0.25}), p.push_back({2. * t - 1, 0.25});
+    }
+    Comb out;
+    const auto n = static_cast<uint32_t>(p.size());
+    for (uint32_t i = 0; i < n; ++i) {
+        const auto &a = p[i], &b = p[(i + 1) % n];
+        out.volume += (a[0] * b[1] - a[1] * b[0]) / 2;
+    }
+    for (const double z : {0., 1.})
+        for (const auto& [x, y] : p)
+            out.vertices.push_back(
+                {x * std::cos(angle) - z * std::sin(angle), y, x * std::sin(angle) + z * std::cos(angle)});
+    out.faces.resize(2);
+    for (uint32_t i = 0; i < n; ++i) {
+        out.faces[0].push_back(n - 1 - i), out.faces[1].push_back(n + i);
+        out.faces.push_back({i, (i + 1) % n, n + (i + 1) % n, n + i});
+    }
+    return out;
+}
+std::string joined(const auto& numbers, double add = 0) {
+    std::string out;
+    char word[40];
+    for (const auto x : numbers) std::snprintf(word, sizeof word, "%.17g ", static_cast<double>(x) + add), out += word;
+    return out;
+}
+
+TEST_F(Import, ConcavePolygonsAreWholeInEveryFormatThatHasThem) {
+    for (const double angle : {0., 0.3, 1.1}) {
+        const Comb c = comb(angle);
+        std::string obj, off, ply, dae_points, dae_corners, dae_sizes, binary;
+        for (const auto& v : c.vertices) {
+            obj += "v " + joined(v) + "\n", off += joined(v) + "\n", dae_points += joined(v);
+            binary.append(reinterpret_cast<const char*>(v.data()), sizeof v);
+        }
+        ply = off;
+        for (const auto& f : c.faces) {
+            const std::string size = std::to_string(f.size()) + " ";
+            obj += "f " + joined(f, 1) + "\n", off += size + joined(f) + "\n", ply += size + joined(f) + "\n";
+            dae_corners += joined(f), dae_sizes += size;
+            binary += static_cast<char>(f.size());
+            binary.append(reinterpret_cast<const char*>(f.data()), f.size() * sizeof f[0]);
+        }
+        const std::string vertices = std::to_string(c.vertices.size()), faces = std::to_string(c.faces.size());
+        const auto header = [&](const std::string& format) {
+            return "ply\nformat " + format + " 1.0\nelement vertex " + vertices +
+                   "\nproperty double x\nproperty double y\nproperty double z\nelement face " + faces +
+                   "\nproperty list uchar int vertex_indices\nend_header\n";
+        };
+        const std::string collada =
+            R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset/>
+<library_geometries><geometry id="g"><mesh><source id="p"><float_array id="a" count=")" +
+            std::to_string(3 * c.vertices.size()) + "\">" + dae_points +
+            R"(</float_array><technique_common><accessor source="#a" count=")" + vertices +
+            R"(" stride="3"><param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+</accessor></technique_common></source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist count=")" +
+            faces + R"("><input semantic="VERTEX" source="#v" offset="0"/><vcount>)" + dae_sizes + "</vcount><p>" +
+            dae_corners + R"(</p></polylist></mesh></geometry></library_geometries><library_visual_scenes>
+<visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>)";
+        for (const std::string& path :
+             {write("c.obj", obj), write("c.off", "OFF\n" + vertices + " " + faces + " 0\n" + off),
+              write("t.ply", header("ascii") + ply), write("b.ply", header("binary_little_endian") + binary),
+              write("c.dae", collada)}) {
+            const Mesh mesh = load(path);
+            const auto cleaned = clean(mesh.view());
+            ASSERT_TRUE(cleaned) << path;
+            EXPECT_TRUE(cleaned->report.closed) << path;
+            EXPECT_EQ(mesh.triangles.size(), 2 * 14 + 2 * 16u) << path;
+            EXPECT_NEAR(signed_volume(mesh), c.volume, 1e-5 * c.volume) << path;
+        }
+    }
+}
+
+TEST_F(Import, APolygonThatCrossesItselfIsNamed) {
+    expect_refused(write("a.obj", "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nf 1 3 2 4\nf 1 2 3 4\n"), ErrorCode::bad_file,
+                   "line 6");
+    expect_refused(write("a.off", "OFF\n4 1 0\n0 0 0\n1 1 0\n1 0 0\n0 1 0\n4 0 1 2 3\n"), ErrorCode::bad_file,
+                   "line 7");
+}
+
+TEST_F(Import, SaysHowFarPolygonsAreFromFlat) {
+    ImportReport report;
+    const std::string quads = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0\nv 2 1 0.25\nf 1 2 3 4\nf 2 5 6 3\n";
+    EXPECT_EQ(load(write("bent.obj", quads), {}, report).triangles.size(), 4u);
+    ASSERT_EQ(report.notes.size(), 1u);
+    EXPECT_TRUE(report.notes[0].starts_with("1 of 2 polygons are not flat")) << report.notes[0];
+}
+
+TEST_F(Import, ReadsTriangleStripsOfPly) {
+    const std::string header =
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+        "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+    expect_tetrahedron(write("strips.ply", header + "0 0 0\n1.5 0 0\n0 1.25 0\n0 0 1\n"
+                                                    "15 0 2 1 -1 0 1 3 -1 1 2 3 -1 2 0 3\n"));
+    const Mesh strip = load(write("strip.ply", header + "0 0 0\n1 0 0\n0 1 0\n1 1 0\n4 0 1 2 3\n"));
+    ASSERT_EQ(strip.triangles.size(), 2u);
+    EXPECT_EQ(strip.triangles[0], (Triangle{0, 1, 2}));
+    EXPECT_EQ(strip.triangles[1], (Triangle{1, 3, 2}));
+}
+
+TEST_F(Import, ObjIsWholeOrRefused) {
+    const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    expect_refused(write("surface.obj", vertices + "f 1 2 3\nsurf 0 1 0 1 1 2 3\n"), ErrorCode::bad_file, "line 5");
+    expect_tetrahedron(write("mark.obj", std::string("\xEF\xBB\xBF") + kObj));
+    expect_tetrahedron(write("colours.obj", "v 0 0 0 1 0 0\nv 1.5 0 0 1 0 0\nv 0 1.25 0 0 1 0\nv 0 0 1 0 1 1\n"
+                                            "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"));
+    ImportReport report;
+    const Mesh weighted = load(write("w.obj", "v 0 0 0 1\nv 2 0 0 2\nv 0 1 0\nf 1 2 3\nl 1 2\n"), {}, report);
+    EXPECT_EQ(weighted.vertices[1], (Vec3{1, 0, 0}));
+    ASSERT_EQ(report.notes.size(), 2u) << "the line, the weight";
+    for (const char* mark : {"\xFF\xFE", "\xFE\xFF"})
+        expect_refused(write("wide.obj", std::string(mark) + std::string("v\0 \0", 4)), ErrorCode::bad_file, "UTF-16");
+    expect_refused(write("far.obj", "v 0 0 0\nv 1e39 0 0\nv 0 1 0\nf 1 2 3\n"), ErrorCode::bad_file, "line 4");
+}
+
+// ---- glTF ----
+
+std::string base64(std::string_view bytes) {
+    static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string out;
+    for (size_t i = 0; i < bytes.size(); i += 3) {
+        uint32_t three = 0;
+        for (size_t k = 0; k < 3; ++k)
+            three = three << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+        for (size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : kDigits[three >> (18 - 6 * k) & 63];
+    }
+    return out;
+}
+
+// Writes a glTF file piece by piece.
+class Gltf {
+public:
+    template <class T> size_t view(const std::vector<T>& numbers, size_t stride = 0) {
+        while (data_.size() % 4) data_ += '\0';
+        const size_t at = data_.size();
+        data_.append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T));
+        add(views_, R"({"buffer":0,"byteOffset":)" + std::to_string(at) + R"(,"byteLength":)" +
+                        std::to_string(data_.size() - at) +
+                        (stride ? R"(,"byteStride":)" + std::to_string(stride) : "") + "}");
+        return view_count_++;
+    }
+    size_t accessor(size_t view, int component, size_t count, const std::string& type, const std::string& more = "") {
+        return raw_accessor(R"("bufferView":)" + std::to_string(view) + "," + words(component, count, type) + more);
+    }
+    static std::string words(int component, size_t count, const std::string& type) {
+        return R"("componentType":)" + std::to_string(component) + R"(,"count":)" + std::to_string(count) +
+               R"(,"type":")" + type + '"';
+    }
+    size_t raw_accessor(const std::string& members) {
+        add(accessors_, "{" + members + "}");
+        return accessor_count_++;
+    }
+    std::string file(const std::string& primitives, const std::string& nodes, const std::string& more) const {
+        return R"({"asset":{"version":"2.0"},"meshes":[{"primitives":[)" + primitives + R"(]}],"nodes":)" + nodes +
+               R"(,"accessors":[)" + accessors_ + R"(],"bufferViews":[)" + views_ + R"(],"buffers":[{"byteLength":)" +
+               std::to_string(data_.size()) + R"(,"uri":"data:application/octet-stream;base64,)" + base64(data_) +
+               "\"}]" + more + "}";
+    }
+
+private:
+    static void add(std::string& list, const std::string& one) { list += (list.empty() ? "" : ",") + one; }
+    std::string data_, views_, accessors_;
+    size_t view_count_ = 0, accessor_count_ = 0;
+};
+constexpr const char* kScene = R"(,"scene":0,"scenes":[{"nodes":[0]}])";
+const std::vector<uint16_t> kTetrahedron = {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+
+// (0 0 0), (1.5 0 0), (0 1.25 0), (0 0 1) as whole numbers of `one`, under a scale that takes them back.
+template <class T> std::string quantised(double one, int component, bool normalised) {
+    const auto q = static_cast<T>(one);
+    Gltf g;
+    // Rows are padded to multiples of four bytes.
+    std::vector<T> rows(4 * 4, 0);
+    rows[4] = rows[9] = rows[14] = q;
+    const size_t points =
+        g.accessor(g.view(rows, 4 * sizeof(T)), component, 4, "VEC3", normalised ? R"(,"normalized":true)" : "");
+    const size_t corners = g.accessor(g.view(kTetrahedron), 5123, 12, "SCALAR");
+    const double unit = normalised ? one / (static_cast<double>(std::numeric_limits<T>::max())) : one;
+    char scale[100];
+    std::snprintf(scale, sizeof scale, R"([{"mesh":0,"scale":[%.17g,%.17g,%.17g]}])", 1.5 / unit, 1.25 / unit,
+                  1 / unit);
+    return g.file(R"({"attributes":{"POSITION":)" + std::to_string(points) + R"(},"indices":)" +
+                      std::to_string(corners) + "}",
+                  scale,
+                  std::string(kScene) +
+                      R"(,"extensionsUsed":["KHR_mesh_quantization"],"extensionsRequired":["KHR_mesh_quantization"])");
+}
+
+TEST_F(Import, QuantisedGltf) {
+    for (const bool normalised : {false, true}) {
+        expect_tetrahedron(write("b.gltf", quantised<int8_t>(100, 5120, normalised)));
+        expect_tetrahedron(write("ub.gltf", quantised<uint8_t>(200, 5121, normalised)));
+        expect_tetrahedron(write("s.gltf", quantised<int16_t>(30000, 5122, normalised)));
+        expect_tetrahedron(write("us.gltf", quantised<uint16_t>(60000, 5123, normalised)));
+    }
+}
+
+TEST_F(Import, InstancesSparseStripsAndFansOfGltf) {
+    const std::vector<float> points = {0, 0, 0, 1.5f, 0, 0, 0, 1.25f, 0, 0, 0, 1};
+    const auto primitive = [](size_t position, const std::string& more) {
+        return R"({"attributes":{"POSITION":)" + std::to_string(position) + "}" + more + "}";
+    };
+    { // three instances under a node that mirrors: one moved, one turned upside down, one doubled
+        Gltf g;
+        const size_t p = g.accessor(g.view(points), 5126, 4, "VEC3"),
+                     c = g.accessor(g.view(kTetrahedron), 5123, 12, "SCALAR");
+        const size_t t = g.accessor(g.view(std::vector<float>{0, 0, 0, 10, 0, 0, 0, 10, 0}), 5126, 3, "VEC3");
+        const size_t r = g.accessor(g.view(std::vector<int16_t>{0, 0, 0, 32767, 32767, 0, 0, 0, 0, 0, 0, 32767}), 5122,
+                                    3, "VEC4", R"(,"normalized":true)");
+        const size_t s = g.accessor(g.view(std::vector<float>{1, 1, 1, 1, 1, 1, 2, 2, 2}), 5126, 3, "VEC3");
+        const std::string nodes =
+            R"([{"mesh":0,"scale":[-1,1,1],"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":)" +
+            std::to_string(t) + R"(,"ROTATION":)" + std::to_string(r) + R"(,"SCALE":)" + std::to_string(s) + "}}}}]";
+        const Mesh mesh =
+            load(write("i.gltf", g.file(primitive(p, R"(,"indices":)" + std::to_string(c)), nodes,
+                                        std::string(kScene) + R"(,"extensionsRequired":["EXT_mesh_gpu_instancing"])")));
+        EXPECT_EQ(mesh.triangles.size(), 12u);
+        EXPECT_NEAR(signed_volume(mesh), (1 + 1 + 8) * kVolume, 1e-4) << "turned by the mirroring node";
+        float left = 0, top = 0, bottom = 0;
+        for (const Vec3& v : mesh.vertices)
+            left = std::min(left, v.x), top = std::max(top, v.y), bottom = std::min(bottom, v.y);
+        EXPECT_NEAR(left, -11.5f, 1e-5);
+        EXPECT_NEAR(top, 12.5f, 1e-5);
+        EXPECT_NEAR(bottom, -1.25f, 1e-4);
+    }
+    { // positions that a sparse accessor puts right, over a view, and over nothing
+        for (const bool over_view : {false, true}) {
+            Gltf g;
+            std::vector<float> wrong = points;
+            wrong[3] = 99, wrong[11] = -5;
+            if (!over_view) wrong.assign(12, 0);
+            const size_t base = g.view(wrong);
+            const size_t at = g.view(std::vector<uint8_t>{1, 2, 3}),
+                         to = g.view(std::vector<float>(points.begin() + 3, points.end()));
+            const std::string sparse = R"(,"sparse":{"count":3,"indices":{"bufferView":)" + std::to_string(at) +
+                                       R"(,"componentType":5121},"values":{"bufferView":)" + std::to_string(to) + "}}";
+            const size_t p = over_view ? g.accessor(base, 5126, 4, "VEC3", sparse)
+                                       : g.raw_accessor(Gltf::words(5126, 4, "VEC3") + sparse);
+            const size_t c = g.accessor(g.view(kTetrahedron), 5123, 12, "SCALAR");
+            expect_tetrahedron(
+                write("s.gltf", g.file(primitive(p, R"(,"indices":)" + std::to_string(c)), R"([{"mesh":0}])", "")));
+        }
+    }
+    { // a strip, and a fan; nodes that the scene does not name stay away
+        Gltf g;
+        const size_t p = g.accessor(g.view(points), 5126, 4, "VEC3");
+        const size_t strip = g.accessor(g.view(std::vector<uint8_t>{0, 2, 1, 3}), 5121, 4, "SCALAR");
+        const size_t fan = g.accessor(g.view(std::vector<uint32_t>{3, 2, 0, 1}), 5125, 4, "SCALAR");
+        const std::string both = primitive(p, R"(,"mode":5,"indices":)" + std::to_string(strip)) + "," +
+                                 primitive(p, R"(,"mode":6,"indices":)" + std::to_string(fan)) + "," +
+                                 primitive(p, R"(,"mode":1)");
+        const std::string path =
+            write("f.gltf", g.file(both, R"([{"mesh":0},{"mesh":0,"translation":[50,0,0]}])", kScene));
+        expect_tetrahedron(path);
+        ImportReport report;
+        load(path, {}, report);
+        EXPECT_EQ(report.notes.size(), 2u) << "y is up; lines are left out";
+    }
+}
+
+TEST_F(Import, GltfExtensionsThatAreNotReadAreNamed) {
+    Gltf g;
+    const size_t p = g.accessor(g.view(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0}), 5126, 3, "VEC3");
+    const std::string primitive = R"({"attributes":{"POSITION":)" + std::to_string(p) + "}}";
+    const auto with = [&](const std::string& name) {
+        return write("x.gltf", g.file(primitive, R"([{"mesh":0}])", R"(,"extensionsRequired":[")" + name + "\"]"));
+    };
+    for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "ACME_new_geometry"})
+        expect_refused(with(name), ErrorCode::bad_file, name);
+    EXPECT_EQ(load(with("KHR_materials_unlit")).triangles.size(), 1u);
+    EXPECT_EQ(load(with("KHR_texture_basisu")).triangles.size(), 1u);
+    // Compressed without being required, and with nothing to fall back on.
+    Gltf h;
+    h.view(std::vector<float>{0, 0, 0});
+    h.raw_accessor(Gltf::words(5126, 3, "VEC3"));
+    expect_refused(write("y.gltf", h.file(R"({"attributes":{"POSITION":0}})", R"([{"mesh":0}])", "")),
+                   ErrorCode::bad_file, "without data");
+    expect_refused(write("z.gltf", g.file(R"({"attributes":{"POSITION":7}})", R"([{"mesh":0}])", "")),
+                   ErrorCode::bad_file, "mesh 0");
+    expect_refused(write("loop.gltf", g.file(primitive, R"([{"mesh":0,"children":[1]},{"children":[0]}])", kScene)),
+                   ErrorCode::bad_file, "node");
+}
+
+// ---- where it stands ----
+
+TEST_F(Import, ScalesMirrorsAndUnits) {
+    const std::string path = write("a.obj", kObj);
+    ImportReport report;
+    const Mesh scaled = load(path, {.unit = 0.001, .scale = {2, 2, 2}}, report);
+    EXPECT_NEAR(signed_volume(scaled), 8e-9 * kVolume, 1e-14);
+    EXPECT_EQ(scaled.placement, (Placement{{0.002, 0.002, 0.002}, {}}));
+    const Mesh mirrored = load(path, {.scale = {1, -1, 3}}, report);
+    EXPECT_NEAR(signed_volume(mirrored), 3 * kVolume, 1e-6) << "its faces are turned";
+    EXPECT_EQ(load(path, placed_as(mirrored.placement), report).vertices, mirrored.vertices);
+    for (const ImportOptions& bad :
+         {ImportOptions{.scale = {1, 0, 1}}, ImportOptions{.scale = {1, NAN, 1}}, ImportOptions{.unit = -1}}) {
+        const auto mesh = load_mesh(path.c_str(), bad);
+        ASSERT_FALSE(mesh);
+        EXPECT_EQ(mesh.error().code, ErrorCode::bad_options);
+    }
+    const std::string millimetres = write("mm.dae", dae(R"(<node id="n"><instance_geometry url="#g"/></node>)"));
+    load(millimetres, {}, report);
+    ASSERT_FALSE(report.notes.empty());
+    EXPECT_NE(report.notes[0].find("0.0254 m"), std::string::npos) << report.notes[0];
+    EXPECT_NE(report.notes[0].find("z up"), std::string::npos) << report.notes[0];
+    EXPECT_NE(hash_mesh_file(path.c_str()), hash_mesh_file(path.c_str(), {.unit = 0.001}));
+}
+
+// The tetrahedron far away, in double precision.
+TEST_F(Import, FarMeshesNeedALocalOrigin) {
+    const auto far = [](double x, double y) {
+        std::string out;
+        for (const auto& v : {std::array<double, 3>{0, 0, 0}, {1.5, 0, 0}, {0, 1.25, 0}, {0, 0, 1}})
+            out += joined(std::array<double, 3>{v[0] + x, v[1] + y, v[2]}) + "\n";
+        return out;
+    };
+    const std::string faces = "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n", points = far(500000.125, 5400000.5);
+    std::string obj = points;
+    for (size_t at = 0; at < obj.size(); at = obj.find('\n', at) + 1) obj.insert(at, "v "), at += 2;
+    const std::string header = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+                               "property double z\nelement face 4\nproperty list uchar int vertex_index\nend_header\n";
+    const std::string solid = [&] {
+        std::string out = "solid a\n";
+        std::vector<std::string> lines;
+        for (size_t at = 0; at < points.size();) {
+            const size_t end = points.find('\n', at);
+            lines.push_back(points.substr(at, end - at)), at = end + 1;
+        }
+        for (size_t i = 0; i < 12; i += 3) {
+            out += "facet normal 0 0 0\nouter loop\n";
+            for (size_t k = 0; k < 3; ++k) out += "vertex " + lines[kTetrahedron[i + k]] + "\n";
+            out += "endloop\nendfacet\n";
+        }
+        return out + "endsolid a\n";
+    }();
+    Gltf g;
+    const size_t p = g.accessor(g.view(std::vector<float>{0, 0, 0, 1.5f, 0, 0, 0, 1.25f, 0, 0, 0, 1}), 5126, 4, "VEC3");
+    const size_t c = g.accessor(g.view(kTetrahedron), 5123, 12, "SCALAR");
+    for (const std::string& path :
+         {write("a.obj", obj + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"), write("a.off", "OFF\n4 4 0\n" + points + faces),
+          write("a.ply", header + points + faces), write("a.stl", solid),
+          write("a.gltf", g.file(R"({"attributes":{"POSITION":)" + std::to_string(p) + R"(},"indices":)" +
+                                     std::to_string(c) + "}",
+                                 R"([{"mesh":0,"translation":[500000.125,5400000.5,0]}])", ""))}) {
+        expect_refused(path, ErrorCode::bad_mesh, "--recentre");
+        ImportReport report;
+        const Mesh mesh = load(path, {.recentre = true}, report);
+        ASSERT_EQ(mesh.triangles.size(), 4u) << path;
+        EXPECT_NEAR(signed_volume(mesh), kVolume, 1e-5) << path;
+        EXPECT_FALSE(report.notes.empty()) << path;
+        for (const Vec3& v : mesh.vertices) { // to the file's own numbers
+            const double x = v.x + mesh.placement.origin[0] - 500000.125,
+                         y = v.y + mesh.placement.origin[1] - 5400000.5;
+            EXPECT_TRUE(std::abs(x) < 1e-6 || std::abs(x - 1.5) < 1e-6) << path << ' ' << x;
+            EXPECT_TRUE(std::abs(y) < 1e-6 || std::abs(y - 1.25) < 1e-6) << path << ' ' << y;
+        }
+        EXPECT_EQ(load(path, placed_as(mesh.placement), report).vertices, mesh.vertices);
+    }
+    // A DAE's text is read in single precision: no origin brings back what that lost.
+    std::string text = dae(R"(<node id="n"><instance_geometry url="#g"/></node>)");
+    text.replace(text.find("0 0 0 1.5 0 0 0 1.25 0 0 0 1"), 28, far(500000.125, 5400000.5));
+    const auto lossy = load_mesh(write("far.dae", text).c_str(), {.recentre = true});
+    ASSERT_FALSE(lossy);
+    EXPECT_EQ(lossy.error().code, ErrorCode::bad_mesh);
+}
+
+// ---- 3MF ----
+
+// A ZIP archive of stored files.
+std::string zip(const std::vector<std::pair<std::string, std::string>>& files) {
+    const auto crc = [](std::string_view bytes) {
+        uint32_t c = ~0u;
+        for (const char byte : bytes) {
+            c ^= static_cast<unsigned char>(byte);
+            for (int i = 0; i < 8; ++i) c = c & 1 ? c >> 1 ^ 0xedb88320u : c >> 1;
+        }
+        return ~c;
+    };
+    const auto put = [](std::string& out, uint32_t value, int bytes) {
+        for (int i = 0; i < bytes; ++i) out += static_cast<char>(value >> 8 * i);
+    };
+    std::string out, index;
+    for (const auto& [name, content] : files) {
+        const auto at = static_cast<uint32_t>(out.size()), size = static_cast<uint32_t>(content.size());
+        std::string common; // version, flags, method, time, date, checksum, sizes, lengths
+        put(common, 20, 2), put(common, 0, 2), put(common, 0, 2), put(common, 0, 2), put(common, 33, 2);
+        put(common, crc(content), 4), put(common, size, 4), put(common, size, 4);
+        put(common, static_cast<uint32_t>(name.size()), 2), put(common, 0, 2);
+        out += "PK\3\4" + common + name + content;
+        index += "PK\1\2";
+        put(index, 20, 2);
+        index += common;
+        put(index, 0, 2), put(index, 0, 2), put(index, 0, 2), put(index, 0, 4), put(index, at, 4);
+        index += name;
+    }
+    const auto begin = static_cast<uint32_t>(out.size()), count = static_cast<uint32_t>(files.size());
+    out += index + "PK\5\6";
+    put(out, 0, 2), put(out, 0, 2), put(out, count, 2), put(out, count, 2);
+    put(out, static_cast<uint32_t>(index.size()), 4), put(out, begin, 4), put(out, 0, 2);
+    return out;
+}
+std::string three_mf(const std::string& unit, const std::string& resources, const std::string& build) {
+    return zip(
+        {{"[Content_Types].xml",
+          R"(<?xml version="1.0"?><Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/><Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/></Types>)"},
+         {"_rels/.rels",
+          R"(<?xml version="1.0"?><Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Target="/3D/3dmodel.model" Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/></Relationships>)"},
+         {"3D/3dmodel.model", R"(<?xml version="1.0"?><model unit=")" + unit +
+                                  R"(" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources>)" +
+                                  resources + "</resources><build>" + build + "</build></model>"}});
+}
+constexpr const char* kObject =
+    R"(<object id="1" type="model"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1.5" y="0" z="0"/><vertex x="0" y="1.25" z="0"/><vertex x="0" y="0" z="1"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/><triangle v1="0" v2="1" v3="3"/><triangle v1="1" v2="2" v3="3"/><triangle v1="2" v2="0" v3="3"/></triangles></mesh></object>)";
+
+TEST_F(Import, ThreeMfWithUnitsComponentsAndTransforms) {
+    expect_tetrahedron(write("a.3mf", three_mf("meter", kObject, R"(<item objectid="1"/>)")));
+    ImportReport report;
+    const Mesh small = load(write("mm.3mf", three_mf("millimeter", kObject, R"(<item objectid="1"/>)")), {}, report);
+    EXPECT_NEAR(signed_volume(small), 1e-9 * kVolume, 1e-15) << "millimetres become metres";
+    EXPECT_EQ(small.placement.scale[0], 0.001);
+    EXPECT_NE(report.notes.at(0).find("millimetres"), std::string::npos);
+    EXPECT_NEAR(
+        signed_volume(load(write("in.3mf", three_mf("inch", kObject, R"(<item objectid="1"/>)")), {.unit = 1}, report)),
+        kVolume, 1e-6)
+        << "unless another unit is told";
+    // A component, moved and mirrored; the build doubles and moves what it is in.
+    const std::string group =
+        std::string(kObject) +
+        R"(<object id="2" type="model"><components><component objectid="1" transform="1 0 0 0 1 0 0 0 -1 10 0 0"/><component objectid="1"/></components></object>)";
+    const Mesh mesh =
+        load(write("g.3mf", three_mf("meter", group, R"(<item objectid="2" transform="2 0 0 0 2 0 0 0 2 0 100 0"/>)")));
+    EXPECT_EQ(mesh.triangles.size(), 8u);
+    EXPECT_NEAR(signed_volume(mesh), 16 * kVolume, 1e-3);
+    float right = 0, low = 0, near = 1000;
+    for (const Vec3& v : mesh.vertices)
+        right = std::max(right, v.x), low = std::min(low, v.z), near = std::min(near, v.y);
+    EXPECT_EQ(right, 23);
+    EXPECT_EQ(low, -2);
+    EXPECT_EQ(near, 100);
+    expect_refused(write("r.3mf", "no archive"), ErrorCode::bad_file, "3MF");
+}
+
 // Real files, where installed (Debian package glmark2-data).
 void expect_model(const char* path, size_t triangles, uint32_t open_edges) {
     if (!fs::exists(path)) GTEST_SKIP() << path << " is not installed (Debian package glmark2-data)";
-    std::string detail;
-    const auto mesh = load_mesh(path, &detail);
-    ASSERT_TRUE(mesh) << mesh.error().what << ' ' << detail;
+    ImportReport report;
+    const auto mesh = load_mesh(path, {}, &report);
+    ASSERT_TRUE(mesh) << mesh.error().what << ' ' << report.detail;
     EXPECT_EQ(mesh->triangles.size(), triangles);
     const auto cleaned = clean(mesh->view());
     ASSERT_TRUE(cleaned);

@@ -88,7 +88,8 @@ Block block(Random& random, double body, const Family& family) {
     for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
         double center[3];
         for (size_t i = 0; i < 3; ++i) center[i] = random.in(low[i], high[i]);
-        const Point radii = family.ratio < 1000 ? scenes::radii(random, family.ratio) : hunt::radii(random);
+        const Point radii =
+            family.ratio < hunt::kLargestRatio ? scenes::radii(random, family.ratio) : hunt::radii(random);
         const double size = body * random.log_in(family.node, 0.5);
         const Ellipsoid e =
             scenes::ellipsoid({}, {size * radii[0], size * radii[1], size * radii[2]}, random.rotation());
@@ -168,7 +169,8 @@ Counts hunt_some(uint64_t seed, uint64_t pairs, const Family& family, double lea
 }
 
 const Family kFamilies[] = {
-    {5, 1e-3, 1, 1}, {100, 1e-3, 10, 10}, {1000, 1e-2, 1, 1}, {1000, 1e-3, 1e4, 1e3}, {30, 1e-4, 0, 1e6},
+    {5, 1e-3, 1, 1},    {100, 1e-3, 10, 10}, {hunt::kLargestRatio, 1e-2, 1, 1}, {hunt::kLargestRatio, 1e-3, 1e4, 1e3},
+    {30, 1e-4, 0, 1e6},
 };
 
 TEST(Lanes, HuntForWrongVerdicts) {

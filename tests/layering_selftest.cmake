@@ -66,7 +66,7 @@ plant(bad builder/planted.cpp "#include \"query/separation.hpp\"")
 plant(bad builder/planted.cpp "#include <glm/vec3.hpp>")
 plant(bad builder/planted.cpp "#include <prolate/glm.hpp>")
 plant(bad builder/planted.cpp "#include <assimp/scene.h>")
-plant(good builder/import.cpp "#include <assimp/scene.h>")
+plant(good builder/import_assimp.cpp "#include <assimp/scene.h>")
 plant(good builder/planted.cpp "#include <Eigen/Dense>")
 plant(good builder/planted.cpp "#include <prolate/verify.hpp>")
 # src knows neither side.

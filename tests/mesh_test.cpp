@@ -4,10 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace prolate {
 namespace {
@@ -87,7 +91,7 @@ TEST(Clean, NegativeZeroIsZeroAndNearIsNotEqual) {
     for (const Vec3& v : cleaned->mesh.vertices) EXPECT_FALSE(std::signbit(v.y));
 
     mesh.vertices[0].x = std::numeric_limits<float>::denorm_min();
-    cleaned = clean(mesh.view());
+    cleaned = clean(mesh.view(), 0);
     ASSERT_TRUE(cleaned);
     EXPECT_FALSE(cleaned->report.closed);
     EXPECT_EQ(cleaned->mesh.vertices.size(), 5u);
@@ -255,6 +259,193 @@ TEST(Clean, AgreesWithCountingByHand) {
                     std::find(cleaned->mesh.vertices.begin(), cleaned->mesh.vertices.end(), mesh.vertices[corner]),
                     cleaned->mesh.vertices.end());
     }
+}
+
+// ---- welding ----
+
+TEST(Clean, AlmostWeldedCornersAreJoinedIfThatClosesTheMesh) {
+    const Mesh whole = torus(20, 10);
+    std::mt19937 engine(3);
+    const auto noise = [&engine](float size) { return size * (static_cast<float>(engine() % 2001) / 1000 - 1); };
+    for (const float far : {0.0f, 100.0f}) { // the tolerance goes with the coordinates
+        Mesh mesh = soup(whole);
+        const float size = std::nextafter(3 + far, 1000.0f) - (3 + far);
+        for (Vec3& v : mesh.vertices) v = {v.x + far + noise(size), v.y + noise(size), v.z + noise(size)};
+        EXPECT_FALSE(clean(mesh.view(), 0)->report.closed);
+        const auto cleaned = clean(mesh.view());
+        ASSERT_TRUE(cleaned);
+        EXPECT_TRUE(cleaned->report.closed);
+        EXPECT_EQ(cleaned->mesh.vertices.size(), 200u);
+        EXPECT_EQ(cleaned->mesh.triangles.size(), 400u);
+        EXPECT_GT(cleaned->report.welded_vertices, 0u);
+        EXPECT_GT(cleaned->report.weld_distance, 0);
+        EXPECT_LE(cleaned->report.weld_distance, 8 * size);
+        EXPECT_EQ(mesh.vertices.size() - cleaned->report.merged_vertices - cleaned->report.welded_vertices, 200u);
+        // Corner by corner, no point moved farther than it says.
+        for (size_t t = 0; t < 400; ++t)
+            for (size_t c = 0; c < 3; ++c) {
+                const Vec3 &a = mesh.vertices[mesh.triangles[t][c]],
+                           &b = cleaned->mesh.vertices[cleaned->mesh.triangles[t][c]];
+                EXPECT_LE(std::hypot(double{a.x} - b.x, double{a.y} - b.y, double{a.z} - b.z),
+                          cleaned->report.weld_distance);
+            }
+    }
+}
+
+TEST(Clean, WeldingLeavesAloneWhatItCannotClose) {
+    Mesh mesh = soup(torus(20, 10));
+    mesh.vertices[7].z += 1e-7f;
+    mesh.triangles.pop_back(); // a hole
+    const auto cleaned = clean(mesh.view());
+    ASSERT_TRUE(cleaned);
+    EXPECT_FALSE(cleaned->report.closed);
+    EXPECT_EQ(cleaned->report.welded_vertices, 0u);
+    EXPECT_EQ(cleaned->report.weld_distance, 0);
+    // A gap of 1e-3 is no noise, unless the user says so.
+    mesh = soup(tetrahedron());
+    mesh.vertices[0].x = 1e-3f;
+    EXPECT_FALSE(clean(mesh.view())->report.closed);
+    EXPECT_TRUE(clean(mesh.view(), 2e-3f)->report.closed);
+    EXPECT_NEAR(clean(mesh.view(), 2e-3f)->report.weld_distance, 1e-3, 1e-9);
+    EXPECT_EQ(clean(mesh.view(), NAN).error().code, ErrorCode::bad_options);
+}
+
+// A closed sheet thinner than the tolerance keeps both sides, also beside a part that has to be welded.
+TEST(Clean, ThinWallsStay) {
+    Mesh mesh;
+    const float thin = 1e-8f;
+    for (const float z : {0.0f, thin})
+        for (const auto& [x, y] : {std::pair{0.f, 0.f}, {1.f, 0.f}, {1.f, 1.f}, {0.f, 1.f}})
+            mesh.vertices.push_back({x, y, z});
+    for (const auto& [a, b, c, d] : {std::array{3u, 2u, 1u, 0u},
+                                     {4u, 5u, 6u, 7u},
+                                     {0u, 1u, 5u, 4u},
+                                     {1u, 2u, 6u, 5u},
+                                     {2u, 3u, 7u, 6u},
+                                     {3u, 0u, 4u, 7u}}) {
+        mesh.triangles.push_back({a, b, c});
+        mesh.triangles.push_back({a, c, d});
+    }
+    Mesh noisy = soup(tetrahedron());
+    noisy.vertices[0].x = 3e-8f;
+    const auto base = static_cast<uint32_t>(mesh.vertices.size());
+    for (const Vec3& v : noisy.vertices) mesh.vertices.push_back({v.x + 2, v.y, v.z});
+    for (Triangle t : noisy.triangles) mesh.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+    mesh.vertices[base].x += 5e-7f;
+    const auto cleaned = clean(mesh.view());
+    ASSERT_TRUE(cleaned);
+    EXPECT_TRUE(cleaned->report.closed);
+    EXPECT_EQ(cleaned->mesh.vertices.size(), 8 + 4u);
+    EXPECT_EQ(cleaned->report.size[2], 1);
+    for (const float z : {0.0f, thin})
+        EXPECT_GE(std::count_if(cleaned->mesh.vertices.begin(), cleaned->mesh.vertices.end(),
+                                [z](const Vec3& v) { return v.z == z; }),
+                  4);
+}
+
+// ---- inside out ----
+
+// A tetrahedron around (x, 0, 0), of inscribed radius about r.
+Mesh ball(float r, float x, bool inward) {
+    Mesh out;
+    for (const Vec3 v : {Vec3{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}})
+        out.vertices.push_back({x + 3 * r * v.x, 3 * r * v.y, 3 * r * v.z});
+    out.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+    if (inward)
+        for (Triangle& t : out.triangles) std::swap(t[0], t[1]);
+    return out;
+}
+double volume_of(const Mesh& mesh) {
+    double six = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+        six += a.x * (double{b.y} * c.z - double{b.z} * c.y) - a.y * (double{b.x} * c.z - double{b.z} * c.x) +
+               a.z * (double{b.x} * c.y - double{b.y} * c.x);
+    }
+    return six / 6;
+}
+Mesh joined(std::initializer_list<Mesh> parts) {
+    Mesh out;
+    for (const Mesh& part : parts) {
+        const auto base = static_cast<uint32_t>(out.vertices.size());
+        out.vertices.insert(out.vertices.end(), part.vertices.begin(), part.vertices.end());
+        for (const Triangle& t : part.triangles) out.triangles.push_back({t[0] + base, t[1] + base, t[2] + base});
+    }
+    return out;
+}
+// Which of the four-triangle parts were turned; all parts stay where they are.
+std::vector<bool> turned(std::initializer_list<Mesh> parts) {
+    const Mesh mesh = joined(parts);
+    const auto cleaned = clean(mesh.view());
+    EXPECT_TRUE(cleaned);
+    std::vector<bool> out;
+    for (size_t p = 0; p < parts.size(); ++p) {
+        Mesh before = mesh, after = cleaned->mesh;
+        before.triangles = {mesh.triangles.begin() + 4 * p, mesh.triangles.begin() + 4 * p + 4};
+        after.triangles = {cleaned->mesh.triangles.begin() + 4 * p, cleaned->mesh.triangles.begin() + 4 * p + 4};
+        EXPECT_NEAR(std::abs(volume_of(before)), std::abs(volume_of(after)), 1e-6 * std::abs(volume_of(before)));
+        out.push_back(volume_of(before) * volume_of(after) < 0);
+    }
+    EXPECT_EQ(cleaned->report.turned_shells, static_cast<uint32_t>(std::count(out.begin(), out.end(), true)));
+    const auto again = clean(cleaned->mesh.view());
+    EXPECT_EQ(again->report.turned_shells, 0u) << "what is right stays";
+    return out;
+}
+using Flags = std::vector<bool>;
+
+TEST(Clean, TurnsShellsThatAreInsideOut) {
+    constexpr bool in = true, out = false;
+    EXPECT_EQ(turned({ball(1, 0, out)}), Flags({false}));
+    EXPECT_EQ(turned({ball(1, 0, in)}), Flags({true}));
+    EXPECT_EQ(turned({ball(1, 500, in)}), Flags({true})) << "wherever it is";
+    EXPECT_EQ(turned({ball(1, 0, out), ball(1, 20, in), ball(1, 40, out)}), Flags({false, true, false}));
+}
+
+TEST(Clean, KeepsCavitiesAndBodiesWithinBodies) {
+    constexpr bool in = true, out = false;
+    EXPECT_EQ(turned({ball(4, 0, out), ball(1, 0, in)}), Flags({false, false})) << "a cavity";
+    EXPECT_EQ(turned({ball(4, 0, out), ball(1, 0, out)}), Flags({false, false})) << "a body within a body";
+    EXPECT_EQ(turned({ball(4, 0, in), ball(1, 0, out)}), Flags({true, true})) << "all of a hollow body is inside out";
+    EXPECT_EQ(turned({ball(4, 0, in), ball(1, 0, in)}), Flags({true, true}));
+    EXPECT_EQ(turned({ball(16, 0, out), ball(4, 0, in), ball(1, 0, out)}), Flags({false, false, false}));
+    EXPECT_EQ(turned({ball(16, 0, out), ball(4, 0, in), ball(1, 0, in)}), Flags({false, false, true}))
+        << "a body in a cavity";
+    EXPECT_EQ(turned({ball(16, 0, in), ball(4, 0, out), ball(1, 0, in)}), Flags({true, true, true}));
+}
+
+TEST(Clean, ShellsThatMeetKeepTheirSolid) {
+    constexpr bool in = true, out = false;
+    EXPECT_EQ(turned({ball(2, 0, out), ball(2, 1, out)}), Flags({false, false}));
+    EXPECT_EQ(turned({ball(2, 0, out), ball(2, 5, in)}), Flags({false, true})) << "it sticks out: it is a body";
+    EXPECT_EQ(turned({ball(2, 0, in), ball(2, 5, in)}), Flags({true, true}));
+}
+
+TEST(Clean, AnOpenPartIsNotTurnedAndAClosedOneBesideItIs) {
+    Mesh open = ball(1, 30, true);
+    open.triangles.pop_back();
+    const auto cleaned = clean(joined({ball(1, 0, true), open}).view());
+    ASSERT_TRUE(cleaned);
+    EXPECT_EQ(cleaned->report.turned_shells, 1u);
+    EXPECT_FALSE(cleaned->report.closed);
+}
+
+TEST(Clean, RefusesSizesThatNoTreeCanHold) {
+    for (const float size : {1e-37f, 1e25f}) {
+        Mesh mesh = tetrahedron();
+        for (Vec3& v : mesh.vertices) v = {v.x * size, v.y * size, v.z * size};
+        const Error error = error_of(mesh);
+        EXPECT_EQ(error.code, ErrorCode::bad_mesh);
+        EXPECT_NE(std::string(error.what).find("scale it"), std::string::npos) << error.what;
+    }
+}
+
+TEST(Clean, KeepsAndHashesThePlacement) {
+    Mesh mesh = tetrahedron();
+    const uint64_t before = hash(mesh.view());
+    mesh.placement.origin[1] = 1000;
+    EXPECT_NE(hash(mesh.view()), before);
+    EXPECT_EQ(clean(mesh.view())->mesh.placement, mesh.placement);
+    EXPECT_EQ(clean(mesh.view())->report.size, (std::array<double, 3>{1, 1, 1}));
 }
 
 } // namespace

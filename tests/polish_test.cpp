@@ -235,7 +235,7 @@ TEST(Polish, CoversAllPiecesWithLessThanTheInflatedStart) {
                 expect_cover(set, scene->pieces, owner);
                 EXPECT_LE(scene->outside(set.fits), before * (1 + 1e-6)) << k;
                 for (const Fit& fit : set.fits) {
-                    EXPECT_TRUE(within_caps(fit, kMinRadius));
+                    EXPECT_TRUE(within_caps(fit, kMinRadius, kMaxAxisRatio));
                     if (primitive == Primitive::sphere) {
                         EXPECT_EQ(fit.factor, fit.factor(0, 0) * Mat::Identity());
                     }

@@ -45,6 +45,10 @@ if(PROLATE_BUILD_BUILDER)
 endif()
 script_test(project.headers_selftest headers_selftest.cmake -D CXX=${CMAKE_CXX_COMPILER} -D WORK=${scratch}/headers)
 
+# Machines and options that are refused.
+script_test(project.host host.cmake -D ROOT=${PROJECT_SOURCE_DIR} -D CXX=${CMAKE_CXX_COMPILER}
+  -D COMPILER=${CMAKE_CXX_COMPILER_ID} -D PROCESSOR=${CMAKE_SYSTEM_PROCESSOR})
+
 # README.
 script_test(project.readme readme.cmake -D README=${PROJECT_SOURCE_DIR}/README.md
   -D EXAMPLES=${PROJECT_SOURCE_DIR}/examples)

@@ -95,17 +95,20 @@ std::ostream& operator<<(std::ostream& out, const Family& family) {
     return out << family.name;
 }
 
+constexpr double kLargestRatio = 16384; // of axes, that bakes make
+
 Point needle(Random& random) {
-    return {1, 1e-3 * random.in(1, 2), 1e-3 * random.in(1, 2)};
+    const double thin = 1 / random.log_in(1e3, kLargestRatio);
+    return {1, thin * random.in(1, 2), thin * random.in(1, 2)};
 }
 Point disc(Random& random) {
-    return {1, random.in(0.5, 1), 1e-3};
+    return {1, random.in(0.5, 1), 1 / random.log_in(1e3, kLargestRatio)};
 }
 
 const Family kFamilies[] = {
     {"round", 200'000, 0.4, 0.6, [](Random& r) { return random_pair(r, 5, 2); }},
     {"ratio_100", 200'000, 0.4, 0.6, [](Random& r) { return random_pair(r, 100, 10); }},
-    {"ratio_1000_sizes_1e4", 100'000, 0.4, 0.6, [](Random& r) { return random_pair(r, 1000, 1e4); }},
+    {"ratio_16384_sizes_1e4", 100'000, 0.4, 0.6, [](Random& r) { return random_pair(r, kLargestRatio, 1e4); }},
     {"needles", 80'000, 0.4, 0.6,
      [](Random& r) { return at_contact(r, centered(needle(r), r), centered(needle(r), r), r.log_in(0.5, 2)); }},
     {"parallel_needles", 40'000, 0.4, 0.6,
@@ -138,13 +141,13 @@ const Family kFamilies[] = {
      }},
     {"nested", 20'000, 0, 0,
      [](Random& r) {
-         const Point small = scenes::radii(r, 1000);
-         return at_contact(r, centered(scenes::radii(r, 1000), r),
+         const Point small = scenes::radii(r, kLargestRatio);
+         return at_contact(r, centered(scenes::radii(r, kLargestRatio), r),
                            centered({1e-4 * small[0], 1e-4 * small[1], 1e-4 * small[2]}, r), r.in(0.0, 0.9));
      }},
     {"concentric", 10'000, 0, 0,
      [](Random& r) {
-         Bodies p = random_pair(r, 1000, 100);
+         Bodies p = random_pair(r, kLargestRatio, 100);
          p.pose_b.translation = p.pose_a.translation;
          return p;
      }},

@@ -165,10 +165,10 @@ std::optional<Model> load_model(const std::string& name, const std::vector<std::
         std::fprintf(stderr, "%s is skipped: there is no %s\n", name.c_str(), paths.front().c_str());
         return std::nullopt;
     }
-    std::string detail;
-    auto mesh = load_mesh(path->c_str(), &detail);
+    ImportReport report;
+    auto mesh = load_mesh(path->c_str(), {}, &report);
     if (!mesh) {
-        std::fprintf(stderr, "%s is skipped: %s %s\n", path->c_str(), mesh.error().what, detail.c_str());
+        std::fprintf(stderr, "%s is skipped: %s %s\n", path->c_str(), mesh.error().what, report.detail.c_str());
         return std::nullopt;
     }
     return finish(name, std::move(*mesh));

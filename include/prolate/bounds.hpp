@@ -18,11 +18,16 @@ inline bool overlap(const Bounds& a, const Bounds& b) noexcept {
              (a.lower.z > b.upper.z) | (b.lower.z > a.upper.z));
 }
 
-/// A box that holds the solid that `tree` covers, at `pose`, and all points nearer to it than `margin` (metres, >= 0).
-/// Certified: rounding is outward, for every pose, however far from the origin. It is the box of the nodes of level 1,
-/// cut by that of the root and by a turned box around a deeper cut; leaf ellipsoids of a proxy tree may stick out of it
-/// where no solid is. Infinite where a pose is not finite, its quaternion zero, or the box beyond the range of floats.
-/// Thread-safe, allocates nothing. Looks at up to 64 nodes or so: a World keeps what does not depend on the pose.
+/// A box that holds the body that is at `pose`, and all points nearer to it than `margin` (metres, >= 0). A body is
+/// what queries answer for: the triangles of an exact tree, or the ellipsoids of the leaves (of a prefix, the cut at
+/// its last level). Certified: rounding is outward, for every pose, however far from the origin.
+///
+/// Tight: along each axis it is at most 1 % longer than the least box (measured: on average 0.5 %), plus rounding to
+/// floats; of sheets, by up to 1e-4 of their longest side. Infinite where a pose is not finite, its quaternion zero,
+/// the box beyond the range of floats, or the margin NaN. A negative margin counts as 0.
+///
+/// Thread-safe, allocates nothing. Takes a few microseconds, for trees of any size: it opens no more than 12 nodes in
+/// each of the six directions. Only of a prefix of an exact tree all leaves are looked at.
 Bounds bounds(const TreeView& tree, const Pose& pose, float margin = 0) noexcept;
 
 } // namespace prolate

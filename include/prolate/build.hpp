@@ -15,7 +15,7 @@ namespace prolate {
 /// them, and of the rest only degree, leaf_triangles and threads change it.
 struct BuildOptions {
     uint32_t degree = 8;           ///< children per node, 2 ... kMaxDegree
-    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1
+    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more gain nothing
     uint32_t ellipsoids = 0;       ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
     float tolerance = 0;           ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
     float distance = 0;            ///< the same for their Hausdorff distance, in % of the diagonal of the mesh's box
@@ -25,6 +25,7 @@ struct BuildOptions {
     float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
     float beta = 0.5f;                          ///< weight of E_vol, >= 0; alpha + beta > 0
     uint64_t seed = 1;                          ///< of all that is drawn at random
+    float weld = kDefaultWeld;                  ///< tolerance for vertices that nearly meet, metres: see clean()
     bool exact = false;                         ///< make an exact tree (tree.hpp)
     uint32_t leaf_triangles = 4;                ///< triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
     uint32_t threads = 0;                       ///< 0 = all cores. The bytes do not depend on it.
@@ -35,7 +36,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
 /// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
-inline constexpr uint32_t kBuilderVersion = 8;
+inline constexpr uint32_t kBuilderVersion = 9;
 
 /// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
 /// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
@@ -48,7 +49,8 @@ struct BuildProgress {
     uint32_t nodes = 0;     ///< nodes made so far
 };
 
-/// Called now and then from one thread at a time; return false to cancel the build.
+/// Called from one thread at a time when something is done, and at least some times a second; return false to cancel
+/// the build, which then ends within a second.
 using ProgressCallback = std::function<bool(const BuildProgress&)>;
 
 /// Figures of one level's cut.
@@ -64,7 +66,7 @@ struct Build {
     Tree tree;
     MeshReport mesh;
     std::vector<LevelReport> levels;
-    double solid_volume = 0;       ///< cubic metres
+    double solid_volume = 0;       ///< cubic metres; 0 where there is no inside, and of exact trees of open meshes
     double solid_volume_error = 0; ///< cubic metres; found as LevelFigures::outside_ratio_error is
     double diagonal = 0;           ///< of the mesh's bounding box, metres
     uint32_t resolution = 0;       ///< voxels along the longest side
@@ -73,10 +75,18 @@ struct Build {
     double seconds = 0;
 };
 
+/// Nodes are as thin as the solid, down to semi-axes of 1/16384 of the longest one, of 1e-5 of the diagonal of the
+/// mesh's box, and of 2^-21 of its largest coordinate, which is a few steps of a float: what is thinner is covered as if
+/// it were that thick.
+inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kThinnestNodeOfPlace = 0x1p-21;
+
+/// Leaves of a tree of so many levels are at most about 1.3 times as far from the solid, in volume outside it (all of
+/// their union, if the mesh encloses nothing), as the set that `ellipsoids` finds for their number.
+///
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
 /// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
-/// Fails with bad_options, unsupported, bad_mesh, cancelled, or internal. Thread-safe.
+/// Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 
 } // namespace prolate

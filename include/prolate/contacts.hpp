@@ -48,27 +48,38 @@ struct ContactResult {
     /// overlapping, though no surfaces meet: a part of one body lies inside the other. There are no points then.
     bool enclosed = false;
     uint64_t found = 0; ///< pairs of leaves, or of triangles, that meet
-    QueryStats stats;
+    QueryStats stats;   ///< looking around triangles counts as tests of triangles
 };
 
 /// Contacts of `a` at `pose_a` and `b` at `pose_b`, and what comes as near as options.margin. Replaces what `manifolds`
 /// holds; points that were there keep age and impulse. Symmetric: for the bodies exchanged, points and normals are,
 /// too. Thread-safe on shared trees.
 ///
-/// The verdict is certified; points are not: they are right but for rounding where surfaces touch or meet by little,
-/// and those of triangles lie on the triangles that meet. If it is overlapping and not `enclosed`, there is a point.
+/// The verdict is certified; points are not: they are right but for rounding where surfaces touch or meet by little. If
+/// it is overlapping and not `enclosed`, there is a point.
 ///  - Trees without triangles: each two leaf ellipsoids that meet have a point, along the direction in which they part
 ///    soonest.
-///  - Exact trees: each two triangles that meet have one of their normals, or the product of two edges, for normal, and
-///    the corners of what the one covers of the other, seen along it, as points. A closed mesh is pushed out of, an
-///    open one towards the nearer side. Normals that only internal edges of a flat surface have do not count. Bodies
-///    that are deeper in each other than their triangles are large are not taken apart soonest; sweep() prevents that.
-/// Of all these, those of about the same normal (within 25 degrees) make a manifold: its normal is their mean, its
-/// points the deepest, and those that make the largest area with it, points of the last query before others. Four
-/// manifolds at most, the deepest; none that another one takes apart on its way. With max_level or a prefix, nodes
-/// stand for what is in them. What meets is gone through twice, and counted once.
+///  - Exact trees: each two triangles that meet have one of their normals, or the product of two edges, for normal: the
+///    one along which what surrounds them, not they alone, overlaps least. So edges and vertices count only in
+///    directions in which no surface rises from them: the inner ones of flat ground give no normals, convex ones those
+///    between their faces', concave ones both faces'. Points are the corners of what the one triangle covers of the
+///    other, seen along the normal, and the deepest vertex of each body around there in the other one. A closed mesh is
+///    pushed out of, an open one towards the nearer side. Vertices that are at the same place are to be one vertex, as
+///    build() sees to. Bodies that are deeper in each other than about half their size may be taken apart through
+///    another side than the nearest; sweep() prevents that.
 ///
-/// Gregorius, "Robust contact creation for physics simulations" (GDC 2015), for the reduction; query/contacts.cpp.
+/// From all of these, in this order:
+///  1. Points are grouped by their normals: those within 25 degrees of a group's first belong to it. Its normal is
+///     their mean, weighted by depth, and its depth that of its deepest point.
+///  2. A group is dropped if another one resolves all it stands for: if the bodies, moved by that one's depth along its
+///     normal, would be apart there. The deepest is tried first.
+///  3. Of the rest the four deepest are kept (kManifolds).
+///  4. Each keeps four points at most (kManifoldPoints): the deepest, to a hundredth, and those that make the largest
+///     area with it; points of the last query before others.
+/// With max_level or a prefix, nodes stand for what is in them. What meets is gone through twice, and counted once.
+///
+/// Gregorius, "Robust contact creation for physics simulations" (GDC 2015), for 4; query/triangle_contact.hpp for the
+/// normals, query/contacts.cpp for the rest.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options = {}) noexcept;
 

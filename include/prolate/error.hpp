@@ -18,7 +18,7 @@ enum class ErrorCode : uint8_t {
     cancelled = 6,     ///< the progress callback asked to stop
     unsupported = 7,   ///< a known word whose work this version does not do
     internal = 8,      ///< a promise of the library did not hold; please report it
-    out_of_memory = 9, ///< the memory resource gave no more; nothing has changed
+    out_of_memory = 9, ///< there is no more, or the memory resource gave no more; nothing has changed
     bad_id = 10,       ///< an id that names nothing (any more)
 };
 

@@ -4,6 +4,7 @@
 #include <prolate/error.hpp>
 #include <prolate/types.hpp>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -16,13 +17,15 @@ namespace prolate {
 struct MeshView {
     std::span<const Vec3> vertices;
     std::span<const Triangle> triangles;
+    Placement placement = {}; ///< in the file's frame: build() writes it into the tree, and moves nothing by it
 };
 
 /// Owned indexed triangles.
 struct Mesh {
     std::vector<Vec3> vertices;
     std::vector<Triangle> triangles;
-    MeshView view() const noexcept { return {vertices, triangles}; }
+    Placement placement = {};
+    MeshView view() const noexcept { return {vertices, triangles, placement}; }
 };
 
 /// What clean() found and did. Counts of triangles unless said otherwise.
@@ -31,12 +34,18 @@ struct MeshReport {
     uint32_t input_triangles = 0;
     uint32_t merged_vertices = 0; ///< vertices that lay exactly on an earlier one
     uint32_t unused_vertices = 0; ///< vertices of no kept triangle
+    /// Vertices that were moved onto another one within the weld tolerance, and how far at most, metres. The cover
+    /// holds the triangles as they stood before, too: bake and proof add this distance to the mesh.
+    uint32_t welded_vertices = 0;
+    double weld_distance = 0;
     /// Of zero area. Those with a repeated corner are dropped if their points lie in other triangles; the rest stay, so
     /// that no point of the surface is lost.
     uint32_t degenerate_triangles = 0;
     uint32_t open_edges = 0;         ///< edges whose triangles do not cancel (boundary, or inconsistently oriented)
     uint32_t non_manifold_edges = 0; ///< edges of three or more triangles
     bool closed = false;             ///< no open edge: winding numbers are whole, and the mesh bounds a solid
+    uint32_t turned_shells = 0;      ///< closed parts that were inside out; their triangles were turned
+    std::array<double, 3> size = {}; ///< of the mesh's box, metres
 };
 
 /// A mesh fit for baking, with the report on how it became so.
@@ -45,24 +54,65 @@ struct CleanMesh {
     MeshReport report;
 };
 
-/// Merges vertices of equal position, drops redundant triangles and unused vertices, and classifies the edges. What
-/// stays keeps its order. Fails with bad_mesh for no triangle with an area, an index out of range, or a coordinate that
-/// is not finite (`what` begins with "triangle" or "vertex", and `where` is its index). O(n log n). Thread-safe.
-Result<CleanMesh> clean(MeshView mesh);
+/// The weld tolerance that clean() chooses itself: eight times the spacing of floats at the largest coordinate.
+inline constexpr float kDefaultWeld = -1;
 
-/// XXH3-64 of vertices and triangles in their order. Of a cleaned mesh, it is what BakeInfo::source_hash holds.
+/// Merges vertices of equal position, drops redundant triangles and unused vertices, and classifies the edges. What
+/// stays keeps its order.
+///
+/// If the mesh is then open, and becomes closed when vertices of open edges within `weld` metres of each other are
+/// joined, they are: each is moved onto the first of its group. (0: never. Below 0: kDefaultWeld.) Vertices of closed
+/// surfaces never move, so that thin walls stay.
+///
+/// Closed parts that are inside out are turned, so that the winding number is nowhere negative: a lone one, a hollow
+/// one with its cavities. What counts as solid (winding number not 0) stays the same, or grows where a part sticks out
+/// of the one that it was to be cut out of. Cavities, and bodies within bodies, stay as they are.
+///
+/// Fails with bad_mesh for no triangle with an area, an index out of range, a coordinate that is not finite or beyond
+/// kLargestCoordinate (`what` begins with "triangle" or "vertex", and `where` is its index), or a mesh of less than 1e-24 m
+/// across; with out_of_memory. O(n log n). Thread-safe.
+Result<CleanMesh> clean(MeshView mesh, float weld = kDefaultWeld);
+
+/// XXH3-64 of vertices, triangles and placement. Of a cleaned mesh, it is what BakeInfo::source_hash holds.
 uint64_t hash(MeshView mesh) noexcept;
 
-/// Reads every mesh of a scene, with its transforms, through Assimp: OBJ, PLY, STL, OFF, glTF/GLB, 3DS, DAE (by the
-/// name's extension). Polygons become triangles; points and lines are left out; mirroring transforms turn the winding.
-/// Coordinates stay as the file has them: a stated unit or up axis (DAE, 3DS) is not applied.
-/// Fails with io (`where` is errno) or bad_file; `detail`, if given, then receives particulars, such as the reader's
-/// own words. The mesh is not cleaned yet. Thread-safe.
-Result<Mesh> load_mesh(const char* path, std::string* detail = nullptr);
+/// How load_mesh() takes a file's coordinates.
+struct ImportOptions {
+    /// Metres of one of the file's units, above 0. None: as its format defines it (3MF; glTF has metres), else 1.
+    std::optional<double> unit = {};
+    std::array<double, 3> scale = {1, 1, 1}; ///< factors along the axes, besides: finite, not 0
+    /// Move the mesh's middle near (0, 0, 0), in double precision: what a mesh far away needs. Placement::origin then
+    /// says from where, in whole steps of a power of two.
+    bool recentre = false;
+    std::optional<std::array<double, 3>> origin = {}; ///< the same to a known place
+};
 
-/// A hash of all that load_mesh() makes the mesh of `path` from: the bytes of the file, its type, the reader's version.
-/// Equal hashes mean equal meshes, at the cost of reading the file. Empty if the file cannot be read, or if the mesh
-/// may depend on other files, too (glTF and GLB that name some). Thread-safe.
-std::optional<uint64_t> hash_mesh_file(const char* path);
+/// Options that take the file just as `placement` says, whatever its format defines.
+ImportOptions placed_as(const Placement& placement);
+
+/// What the user should know of an import.
+struct ImportReport {
+    std::string detail;             ///< of an error: the place in the file, a reader's own words
+    std::vector<std::string> notes; ///< what the file states and what was done about it, a line each
+};
+
+/// Reads every mesh of a scene, with its transforms: OBJ, PLY, STL, OFF, glTF/GLB, 3MF, 3DS, DAE (by the name's
+/// extension). Positions are read in double precision where the file has it (not of DAE), placed as `options` say, and
+/// only then rounded to float. Mirroring transforms and scales turn the faces.
+///
+/// Polygons, concave ones too, are cut into triangles that tile them exactly; if one is not flat, these triangles are
+/// what counts as the surface, and the report says how far from flat. A polygon that crosses itself is an error that
+/// names it. Points and lines are left out. Axes stay as the file has them. A DAE's unit is noted and not applied; a
+/// 3MF's is. Of glTF, quantised positions and GPU instances are read; compressed geometry is refused by name.
+///
+/// Fails with io (`where` is errno), out_of_memory, bad_file, or bad_mesh: that is a mesh so far from (0, 0, 0) that floats there are
+/// farther apart than 1e-5 of its diagonal (without `recentre`). What follows a "; " in Error::what is advice. The mesh
+/// is not cleaned yet. Thread-safe.
+Result<Mesh> load_mesh(const char* path, const ImportOptions& options = {}, ImportReport* report = nullptr);
+
+/// A hash of all that load_mesh() makes the mesh of `path` from: the bytes of the file, its type, the options, the
+/// reader's version. Equal hashes mean equal meshes, at the cost of reading the file. Empty if the file cannot be read,
+/// or if the mesh may depend on other files, too (glTF and GLB that name some). Thread-safe.
+std::optional<uint64_t> hash_mesh_file(const char* path, const ImportOptions& options = {});
 
 } // namespace prolate

@@ -32,6 +32,12 @@ inline constexpr uint32_t kBlockLanes = 8; ///< nodes that a block has room for
 inline constexpr size_t kBlockBytes = 256; ///< bytes of one block in the file
 inline constexpr size_t kHullBytes = 64;   ///< bytes of one hull record in the file
 
+/// Absolute value of a vertex' coordinate, metres, at most: build(), verify() and open() refuse meshes beyond it. Two
+/// things set it. The coarsest lattice, of 2^16 steps of 2^60 m, holds the centers of nodes; and queries multiply up to
+/// twelve lengths (a triple product's factor of edges and normals, squared), none of which exceeds the diameter 2^76,
+/// so that all stays below 2^912, within a double.
+inline constexpr float kLargestCoordinate = 0x1p74f; // 1.9e22
+
 /// Triangles in a leaf of an exact tree, at most.
 inline constexpr uint32_t kMaxLeafTriangles = 127;
 
@@ -50,7 +56,7 @@ struct BakeInfo {
     bool exact = false;        ///< an exact tree: only the triangles are covered, and stored beside the nodes
     bool proved = false;       ///< the cover of every level was proved, after quantisation, before the file was written
     bool goal_reached = true;  ///< false: the asked count, tolerance or distance could not be met
-    double solid_volume = 0;   ///< volume of the solid, cubic metres; 0 where there is no inside
+    double solid_volume = 0;   ///< of the solid, cubic metres; 0 where there is no inside, and of exact open meshes
     float solid_volume_error = 0; ///< of solid_volume, relative; found as LevelFigures::outside_ratio_error is
     double diagonal = 0;          ///< of the mesh's bounding box, metres
     Method method = Method::voxel;
@@ -63,6 +69,8 @@ struct BakeInfo {
     uint32_t ellipsoids = 0;   ///< asked leaves, 0 = not asked
     uint64_t seed = 0;         ///< of the surface sampling
     uint32_t resolution = 0;   ///< voxels along the longest side
+    Placement placement;       ///< of the mesh in the frame of its file: answers are relative to its origin
+    float weld = -1;           ///< asked tolerance for vertices that nearly meet, metres; below 0: the default
 };
 
 /// How close one level's cut is to the mesh, as measured on the decoded nodes when it was baked. NaN is unknown: ratios
@@ -261,8 +269,8 @@ public:
 Result<Tree> load(const char* path);
 
 /// Writes `bytes` to `path` so that an interruption at any moment leaves the old file or the new one, never a part:
-/// temporary file beside it, fsync, rename. An existing target that is not a regular file (a pipe, /dev/stdout) is
-/// written directly. Fails with io; `where` is then errno.
+/// temporary file beside it, fsync, rename. Symbolic links are followed. An existing target that is not a regular file
+/// (a pipe, /dev/stdout) is written directly. Fails with io; `where` is then errno.
 Result<void> save(const char* path, std::span<const std::byte> bytes);
 
 } // namespace prolate

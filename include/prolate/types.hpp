@@ -20,6 +20,13 @@ struct Vec3 {
 
 using Triangle = std::array<uint32_t, 3>; ///< three vertex indices
 
+/// Where a mesh stands in the frame of the file that it came from: mesh = scale * file - origin, axis by axis.
+struct Placement {
+    std::array<double, 3> scale = {1, 1, 1}; ///< finite, not 0; an odd number of negative ones mirrors
+    std::array<double, 3> origin = {};       ///< finite, metres: the file's (scaled) point that is the mesh's (0, 0, 0)
+    friend bool operator==(const Placement&, const Placement&) = default;
+};
+
 /// Rotation as a quaternion. Queries normalise it, so its length need not be exactly 1; it must not be 0.
 struct Quat {
     float x = 0, y = 0, z = 0, w = 1;

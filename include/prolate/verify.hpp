@@ -34,7 +34,8 @@ struct VerifyReport {
 /// Options of verify().
 struct VerifyOptions {
     uint32_t threads = 0; ///< 0 = all cores
-    /// Called between pieces of work with the fraction done; return false to cancel.
+    /// Called now and then, at least some times a second, from one thread at a time, with the fraction done; return
+    /// false to cancel: verify() then ends within a second.
     std::function<bool(double)> progress;
 };
 
@@ -42,7 +43,8 @@ struct VerifyOptions {
 /// clipped to the cell, and its corners inside the solid) lies in one node of the *decoded* tree, because then, an
 /// ellipsoid being convex, everything in between does. To lie in a node is to lie in its ellipsoid and in those of all
 /// nodes above it, which is more than queries need: they get there by the bounding volumes, which are proved to hold
-/// all ellipsoids below. A point of the solid in no node ends the proof as a counterexample;
+/// all ellipsoids below. The mesh is given as it was read: it is welded as when the tree was baked, and where that moves
+/// points, they are proved where they stood. A point of the solid in no node ends the proof as a counterexample;
 /// a cell that cannot be decided at 1e-9 of the mesh's size ends it as "not proved". Of an exact tree, the triangles
 /// are compared with the mesh's, and each is looked for in every ellipsoid above it. A prefix of one is proved to cover
 /// the triangles, as in surface mode. Thread-safe. Fails with bad_mesh or cancelled.

@@ -1,0 +1,82 @@
+#include "cli/mesh_options.hpp"
+
+#include "cli/common.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+namespace prolate::cli {
+namespace {
+
+constexpr std::pair<const char*, double> kUnits[] = {
+    {"mm", 0.001}, {"cm", 0.01}, {"m", 1}, {"in", 0.0254}, {"ft", 0.3048}};
+
+} // namespace
+
+void declare_mesh_options(CLI::App& app, MeshOptions& options, bool tree) {
+    const std::string unless = tree ? " (default: as the tree was baked)" : "";
+    std::vector<std::string> names;
+    for (const auto& [name, metres] : kUnits) names.emplace_back(name);
+    app.add_option("--unit", options.unit,
+                   "unit of the mesh's file: mm, cm, m, in or ft; coordinates become metres" + unless)
+        ->check(CLI::IsMember(names));
+    app.add_option("--scale", options.scale,
+                   "multiply the mesh's coordinates by S, or by X,Y,Z; negative mirrors" + unless)
+        ->delimiter(',')
+        ->expected(1, 3)
+        ->allow_extra_args(false); // or it would swallow the file names that follow
+    app.add_flag("--recentre", options.recentre, "take a mesh far from (0, 0, 0) around a local origin" + unless);
+}
+
+std::optional<ImportOptions> import_options(const MeshOptions& options, int& code,
+                                            const std::optional<Placement>& placement) {
+    const bool says_nothing = options.unit.empty() && options.scale.empty() && !options.recentre;
+    if (placement && says_nothing) return placed_as(*placement);
+    ImportOptions out;
+    const auto named = [&options](const auto& unit) { return options.unit == unit.first; };
+    if (const auto unit = std::find_if(std::begin(kUnits), std::end(kUnits), named); unit != std::end(kUnits))
+        out.unit = unit->second;
+    const auto sound = [](double s) { return std::isfinite(s) && s != 0; };
+    if (options.scale.size() == 2 || !std::all_of(options.scale.begin(), options.scale.end(), sound)) {
+        code =
+            complain(kUsage, "--scale", "must be one number or three, none of them 0", "write it as 0.001 or 1,1,-1");
+        return {};
+    }
+    for (size_t k = 0; k < 3 && !options.scale.empty(); ++k)
+        out.scale[k] = options.scale[options.scale.size() == 3 ? k : 0];
+    out.recentre = options.recentre;
+    return out;
+}
+
+std::string size_text(const MeshReport& report) {
+    return fmt::format("{:.6g} x {:.6g} x {:.6g} m", report.size[0], report.size[1], report.size[2]);
+}
+
+void describe_mesh(const std::string& path, const MeshReport& report) {
+    // Some readers give each triangle corners of its own, so the number merged says little of the file.
+    const uint32_t distinct =
+        report.input_vertices - report.merged_vertices - report.welded_vertices - report.unused_vertices;
+    note(path, fmt::format("{} triangles on {} distinct vertices ({} as read), box {}", grouped(report.input_triangles),
+                           grouped(distinct), grouped(report.input_vertices), size_text(report)));
+    if (report.welded_vertices > 0)
+        note(path,
+             fmt::format("{} vertices joined with others up to {:.2g} m away, which closes the mesh; its surface is "
+                         "covered as it stood before, too",
+                         grouped(report.welded_vertices), report.weld_distance));
+    if (report.turned_shells > 0)
+        note(path, fmt::format("{} closed part{} inside out: turned", grouped(report.turned_shells),
+                               report.turned_shells == 1 ? " was" : "s were"));
+    if (report.degenerate_triangles > 0)
+        note(path, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
+    if (report.non_manifold_edges > 0)
+        note(path, fmt::format("{} edges belong to three or more triangles", grouped(report.non_manifold_edges)));
+    if (!report.closed)
+        note(path, fmt::format("{} open edges: no inside can be promised, surface mode", grouped(report.open_edges)));
+}
+
+} // namespace prolate::cli
