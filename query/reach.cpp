@@ -6,8 +6,6 @@
 #include "src/hull.hpp"
 #include "src/power_of_two.hpp"
 
-#include <prolate/version.hpp>
-
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -28,9 +26,9 @@ double sum_of_sizes(const dvec3& v) {
     return std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
 }
 
-// Does the box of every node hold all that lies below it?
+// Does the box of every node, in its bounding block, hold all that lies below it? Not in a prefix of an exact tree.
 bool nested_boxes(const TreeView& tree) {
-    return tree.has_triangles() || (kFormatVersion >= 5 && !tree.bake_info().exact);
+    return tree.has_triangles() || !tree.bake_info().exact;
 }
 
 // An ellipsoid as seen along a unit vector r.
@@ -53,7 +51,7 @@ struct Interval {
 
 // How far the boxes of a block reach along r; what lanes without a node say means nothing.
 void box_reaches(const TreeView& tree, uint32_t b, const dvec3& r, double rounding, Interval (&out)[kBlockLanes]) {
-    const std::byte* const block = tree.block(b);
+    const std::byte* const block = tree.bounding_block(b);
     const LatticeInfo lattice = tree.lattice();
     const double step = power_of_two(lattice.step_exponent);
     double wide[kBlockLanes] = {}, at[kBlockLanes] = {}, size[kBlockLanes] = {};
