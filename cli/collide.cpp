@@ -86,7 +86,8 @@ void add_collide(CLI::App& app, Work& chosen) {
     command->add_option("b", a->tree_b, "the .etree file of body B")->required();
     command->add_option("--pose", a->pose, "of B in the frame of A: tx,ty,tz[,qx,qy,qz,qw]")->capture_default_str();
     command->add_option("--level", a->level, "look no deeper than this level (default: all)");
-    command->add_option("--budget", a->budget, "stop undecided after so many tests of nodes and triangles (default: never)");
+    command->add_option("--budget", a->budget,
+                        "stop undecided after so many tests of nodes and triangles (default: never)");
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

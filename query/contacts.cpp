@@ -133,7 +133,8 @@ public:
             const double depth = other.way.depth + kSlack * std::abs(other.way.depth);
             return std::all_of(one.patch->begin(), one.patch->end(),
                                [&](const Candidate& c) { return resolves(n, depth, c.pair); }) &&
-                   glm::dot(n, one.way.normal) * one.deepest.depth() <= depth + patches_.apart();
+                   (one.deepest.empty() ||
+                    glm::dot(n, one.way.normal) * one.deepest.depth() <= depth + patches_.apart());
         };
         bool needed[Patches::kMost];
         std::fill_n(needed, count, true);
