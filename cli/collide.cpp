@@ -136,7 +136,8 @@ void add_collide(CLI::App& app, Work& chosen) {
     command->add_option("b", a->tree_b, "the .etree file of body B, or - for standard input")->required();
     command->add_option("--pose", a->pose, "of B in the frame of A: tx,ty,tz[,qx,qy,qz,qw]")->capture_default_str();
     command->add_option("--level", a->level, "look no deeper than this level (default: all)");
-    command->add_option("--budget", a->budget, "stop undecided after so many pair tests (default: never)");
+    command->add_option("--budget", a->budget,
+                        "stop undecided after so many tests of nodes and triangles (default: never)");
     command->add_flag("--exit-code", a->exit_code, "tell the verdict by the exit code, too; see below");
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kFooter);

@@ -124,15 +124,20 @@ public:
             for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];
             groups[at] = group;
         });
+        // Are all pairs of the one parted along the other, and all its deepest points?
+        const auto covers = [&](const Group& other, const Group& one) {
+            const dvec3& n = other.way.normal;
+            const double depth = other.way.depth + kSlack * std::abs(other.way.depth);
+            return std::all_of(one.patch->begin(), one.patch->end(),
+                               [&](const Candidate& c) { return resolves(n, depth, c.pair); }) &&
+                   (one.deepest.empty() ||
+                    glm::dot(n, one.way.normal) * one.deepest.depth() <= depth + patches_.apart());
+        };
         bool needed[Patches::kMost];
         std::fill_n(needed, count, true);
         for (uint32_t i = 0; i < count; ++i)
             for (uint32_t j = 0; j < count && needed[i]; ++j)
-                if (j != i && needed[j])
-                    needed[i] = !std::all_of(groups[i].patch->begin(), groups[i].patch->end(), [&](const Candidate& c) {
-                        return resolves(groups[j].way.normal,
-                                        groups[j].way.depth + kSlack * std::abs(groups[j].way.depth), c.pair);
-                    });
+                if (j != i && needed[j]) needed[i] = !covers(groups[j], groups[i]);
         for (uint32_t i = 0; i < count && ways_ < kManifolds; ++i)
             if (needed[i]) way_[ways_] = groups[i].way, points_[ways_] = groups[i].deepest, ++ways_;
         settled_ = true;

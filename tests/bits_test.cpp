@@ -142,7 +142,7 @@ TEST(Bits, Distance) {
 }
 
 TEST(Bits, Contacts) {
-    expect_bits(5905837834654405414u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(6605741296686021366u, [](Bits& bits, const Scenes::Pair& p) {
         ContactManifolds manifolds;
         const ContactResult r = contacts(p.a, p.pose_a, p.b, p.pose_b, manifolds, context(), {.margin = 0.01f});
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats, manifolds.count);
