@@ -51,7 +51,7 @@ TEST_F(Cli, BakeReportsEachLevel) {
     EXPECT_EQ(levels, 3);
     EXPECT_EQ(baked_err_.find('\r'), std::string::npos) << "no progress line where stderr is no terminal";
     // 6 sides of 8 x 8 squares, whose points are shared: 6 * 8 * 8 + 2 points, 2 triangles and 4 corners a square.
-    EXPECT_NE(baked_err_.find("768 triangles on 386 distinct vertices (386 as read), box "), std::string::npos)
+    EXPECT_NE(baked_err_.find("768 triangles on 386 distinct vertices (1,536 as read), box "), std::string::npos)
         << baked_err_;
 
     const Json report = Json::parse(read(shared("report.json")));
@@ -236,7 +236,7 @@ TEST_F(Cli, BadMeshesAreRefused) {
     stl[80] = 1;
     const float corners[9] = {0, 0, 0, 1, 0, 0, 0, std::nanf(""), 0};
     std::copy_n(reinterpret_cast<const char*>(corners), sizeof corners, stl.begin() + 84 + 12);
-    expect_bake_fails(file("nan.stl", stl), 3, "not finite (index ");
+    expect_bake_fails(file("nan.stl", stl), 3, "not finite (triangle 1)");
 }
 
 TEST_F(Cli, WrongUsageIsOneLineWithAHint) {
@@ -725,7 +725,7 @@ TEST_F(Cli, InfoTellsWhatIsThere) {
 TEST_F(Cli, VerifySaysYesAndNo) {
     const Outcome yes = run({"verify", shared("peanut.etree"), shared("peanut.obj")});
     EXPECT_EQ(yes.code, 0) << yes.out;
-    EXPECT_EQ(yes.err, "");
+    EXPECT_EQ(std::count(yes.err.begin(), yes.err.end(), '\n'), 1) << "the mesh's line alone:\n" << yes.err;
     EXPECT_NE(yes.out.find("level 2: covered"), std::string::npos) << yes.out;
 
     Mesh moved = peanut(8);
@@ -742,6 +742,109 @@ TEST_F(Cli, VerifySaysYesAndNo) {
     EXPECT_FALSE(report["baked_from_this_mesh"]);
     EXPECT_EQ(report["levels"][0]["counterexample"].size(), 3u);
     EXPECT_EQ(run({"verify", shared("peanut.etree"), file("missing.obj")}).code, 4);
+}
+
+// ---- where the mesh stands ----
+
+TEST_F(Cli, UnitsScalesAndOriginsNeedNoSecondTelling) {
+    const std::string mesh = file("cube.obj", obj_text(cube()));
+    const auto bake = [&](const std::vector<std::string>& options) {
+        std::vector<std::string> words = {"bake", mesh, "-o", file("a.etree"), "--exact", "--force"};
+        words.insert(words.end(), options.begin(), options.end());
+        return run(words);
+    };
+    struct Case {
+        std::vector<std::string> options;
+        const char* box;
+        std::array<double, 3> scale;
+    };
+    for (const Case& c :
+         {Case{{"--unit", "mm"}, "box 0.002 x 0.002 x 0.002 m", {0.001, 0.001, 0.001}},
+          Case{{"--scale", "2"}, "box 4 x 4 x 4 m", {2, 2, 2}},
+          Case{{"--scale", "1,-3,0.5", "--unit", "in"}, "box 0.0508 x 0.1524 x 0.0254 m", {0.0254, -0.0762, 0.0127}}}) {
+        const Outcome baked = bake(c.options);
+        EXPECT_EQ(baked.code, 0) << baked.err;
+        EXPECT_NE(baked.err.find(c.box), std::string::npos) << baked.err;
+        EXPECT_EQ(baked.err.find("inside out"), std::string::npos) << "mirrored faces are turned: " << baked.err;
+        const Json info = Json::parse(run({"info", file("a.etree"), "--json"}).out);
+        for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(info["scale"][k].get<double>(), c.scale[k], 1e-12);
+        const Outcome verified = run({"verify", file("a.etree"), mesh});
+        EXPECT_EQ(verified.code, 0) << verified.out << verified.err;
+        EXPECT_NE(verified.err.find(c.box), std::string::npos) << verified.err;
+        EXPECT_EQ(run({"verify", file("a.etree"), mesh, "--scale", "7"}).code, 1) << "it may be told otherwise";
+    }
+    for (const std::vector<std::string>& wrong :
+         {std::vector<std::string>{"--unit", "furlong"}, {"--scale", "0"}, {"--scale", "1,2"}, {"--weld", "-1"}})
+        EXPECT_EQ(bake(wrong).code, 2) << wrong[1];
+
+    Mesh far = cube();
+    std::ostringstream text;
+    text.precision(17);
+    for (const Vec3& v : far.vertices) text << "v " << v.x + 500000.25 << ' ' << v.y + 5400000.0 << ' ' << v.z << '\n';
+    const std::string shape = obj_text(far);
+    text << shape.substr(shape.find("f "));
+    write(mesh, text.str());
+    const Outcome refused = bake({});
+    EXPECT_EQ(refused.code, 3);
+    EXPECT_NE(refused.err.find("--recentre"), std::string::npos) << refused.err;
+    EXPECT_EQ(bake({"--recentre"}).code, 0);
+    const Json info = Json::parse(run({"info", file("a.etree"), "--json"}).out);
+    EXPECT_NEAR(info["origin"][0].get<double>(), 500000, 1);
+    EXPECT_NEAR(info["origin"][1].get<double>(), 5400000, 1);
+    EXPECT_NE(run({"info", file("a.etree")}).out.find("origin"), std::string::npos);
+    EXPECT_EQ(run({"verify", file("a.etree"), mesh}).code, 0);
+
+    write(mesh, obj_text(cube()));
+    const std::string manifest = file("assets.json", R"({"defaults": {"exact": true}, "assets": [
+        {"mesh": "cube.obj", "output": "one.etree", "unit": "cm"},
+        {"mesh": "cube.obj", "output": "two.etree", "scale": [1, 1, -2], "recentre": true},
+        {"mesh": "cube.obj", "output": "three.etree", "scale": 0.5, "weld": 0}]})");
+    EXPECT_EQ(run({"bake", "--manifest", manifest, "--cache", file("cache")}).code, 0);
+    const double expected[][3] = {{0.01, 0.01, 0.01}, {1, 1, -2}, {0.5, 0.5, 0.5}};
+    const char* const names[] = {"one.etree", "two.etree", "three.etree"};
+    for (size_t i = 0; i < 3; ++i) {
+        const Json one = Json::parse(run({"info", file(names[i]), "--json"}).out);
+        for (size_t k = 0; k < 3; ++k) EXPECT_EQ(one["scale"][k], expected[i][k]) << names[i];
+        EXPECT_EQ(run({"verify", file(names[i]), mesh}).code, 0);
+    }
+}
+
+std::string fmt_vertex(float x, float y, float z) {
+    std::ostringstream out;
+    out.precision(9);
+    out << "v " << x << ' ' << y << ' ' << z << '\n';
+    return out.str();
+}
+
+TEST_F(Cli, WhatWasDoneToAMeshIsTold) {
+    Mesh turned = cube();
+    for (Triangle& t : turned.triangles) std::swap(t[0], t[1]);
+    const Outcome inside_out = run({"bake", file("turned.obj", obj_text(turned)), "-o", file("a.etree"), "--exact"});
+    EXPECT_EQ(inside_out.code, 0);
+    EXPECT_NE(inside_out.err.find("1 closed part was inside out"), std::string::npos) << inside_out.err;
+    std::string loose; // each triangle with corners of its own, one of them a little off
+    const Mesh whole = cube();
+    for (size_t t = 0; t < whole.triangles.size(); ++t)
+        for (size_t c = 0; c < 3; ++c) {
+            const Vec3& v = whole.vertices[whole.triangles[t][c]];
+            loose += fmt_vertex(v.x + (t == 0 && c == 0 ? 6e-8f : 0), v.y, v.z);
+        }
+    for (size_t t = 0; t < whole.triangles.size(); ++t)
+        loose +=
+            "f " + std::to_string(3 * t + 1) + " " + std::to_string(3 * t + 2) + " " + std::to_string(3 * t + 3) + "\n";
+    const std::string mesh = file("loose.obj", loose);
+    const Outcome joined = run({"bake", mesh, "-o", file("b.etree"), "--quality", "fast", "--ellipsoids", "2"});
+    EXPECT_EQ(joined.code, 0) << joined.err;
+    EXPECT_NE(joined.err.find("12 triangles on 8 distinct vertices"), std::string::npos) << joined.err;
+    EXPECT_NE(joined.err.find("1 vertices joined"), std::string::npos) << joined.err;
+    EXPECT_EQ(run({"verify", file("b.etree"), mesh}).code, 0);
+    const Outcome apart = run({"bake", mesh, "-o", file("c.etree"), "--exact", "--weld", "0"});
+    EXPECT_NE(apart.err.find("surface mode"), std::string::npos) << apart.err;
+    const Outcome large =
+        run({"bake", file("large.obj", "v 0 0 0\nv 1e25 0 0\nv 0 1e25 0\nf 1 2 3\n"), "-o", file("d.etree")});
+    EXPECT_EQ(large.code, 3);
+    EXPECT_NE(large.err.find("another unit"), std::string::npos) << large.err;
+    EXPECT_EQ(std::count(large.err.begin(), large.err.end(), '\n'), 1) << large.err;
 }
 
 // ---- export ----
