@@ -161,9 +161,9 @@ std::string mesh_kind_of(std::string_view bytes) {
 
 // A mesh from standard input. The importer wants a name, by whose ending it knows the format.
 Result<Mesh> load_standard_input(const ImportOptions& options, ImportReport& report) {
-    const GracefulStop removes_its_file;
     const auto bytes = read_file("-");
     if (!bytes) return bytes.error();
+    const GracefulStop removes_its_file;
     std::error_code error;
     const std::string kind = mesh_kind_of(*bytes);
     std::string name = (std::filesystem::temp_directory_path(error) / "prolate-XXXXXX.").string() + kind;

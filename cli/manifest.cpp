@@ -231,10 +231,10 @@ std::string summary_table(const std::vector<Entry>& entries) {
 } // namespace
 
 int bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache, const ManifestOptions& options) {
-    const GracefulStop keeps_what_is_done;
     int code = kDone;
     std::vector<Entry> entries = read_manifest(path, options, code);
     if (code != kDone) return code;
+    const GracefulStop keeps_what_is_done;
     // What can be known at once is said at once, before hours of work.
     outputs.reads(path, "the manifest");
     for (size_t i = 0; i < entries.size(); ++i)

@@ -428,9 +428,9 @@ TEST_F(Export, OuterMeshesHoldTheEllipsoids) {
         for (const auto& [name, content] : {std::pair{"a.ply", as_ply(hard_pieces(), segments, Facets::outer)},
                                             {"a.obj", as_obj(hard_pieces(), segments, Facets::outer)}}) {
             SCOPED_TRACE(name);
-            std::string detail;
-            const auto mesh = load_mesh(file(name, content).c_str(), &detail);
-            ASSERT_TRUE(mesh) << mesh.error().what << detail;
+            ImportReport report;
+            const auto mesh = load_mesh(file(name, content).c_str(), {}, &report);
+            ASSERT_TRUE(mesh) << mesh.error().what << report.detail;
             expect_to_hold(*mesh, hard_pieces(), segments * segments / 2);
         }
         const std::vector<Piece> pieces = some_pieces(12);
