@@ -15,9 +15,9 @@ file(WRITE ${WORK}/b.obj "v 0 0 0\nv 2 0 0.4\nv 2 0.3 0.4\nv 0 0.3 0\nv 0 0 0.3\
 v 1 0.1 -0.5\nf 1 4 9\nf 4 3 9\nf 3 2 9\nf 2 1 9\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 4 8 7\nf 4 7 3\nf 1 5 8\nf 1 8 4
 f 2 3 7\nf 2 7 6\n")
 foreach(name a b)
-  must_run(${PROLATE} bake ${WORK}/${name}.obj -o ${WORK}/${name}.etree --force
+  must_run(${PROLATE} bake ${WORK}/${name}.obj -o ${WORK}/${name}.etree --rebake
     --quality fast --levels 2 OUTPUT_QUIET ERROR_QUIET)
-  must_run(${PROLATE} bake ${WORK}/${name}.obj -o ${WORK}/${name}_exact.etree --force
+  must_run(${PROLATE} bake ${WORK}/${name}.obj -o ${WORK}/${name}_exact.etree --rebake
     --exact --leaf-triangles 1 OUTPUT_QUIET ERROR_QUIET)
 endforeach()
 foreach(pair "a;b" "a_exact;b_exact" "a_exact;b")
