@@ -749,7 +749,7 @@ TEST_F(Cli, VerifySaysYesAndNo) {
 TEST_F(Cli, UnitsScalesAndOriginsNeedNoSecondTelling) {
     const std::string mesh = file("cube.obj", obj_text(cube()));
     const auto bake = [&](const std::vector<std::string>& options) {
-        std::vector<std::string> words = {"bake", mesh, "-o", file("a.etree"), "--exact", "--force"};
+        std::vector<std::string> words = {"bake", mesh, "-o", file("a.etree"), "--exact", "--rebake"};
         words.insert(words.end(), options.begin(), options.end());
         return run(words);
     };
