@@ -76,9 +76,10 @@ std::string as_text(const VerifyReport& report) {
         out += report.same_mesh ? "exact tree: its triangles are the mesh's\n"
                                 : "exact tree: its triangles are NOT the mesh's\n";
     if (!report.bounded)
-        out += fmt::format("node {}: its bounding volume does NOT hold all ellipsoids below it, so queries may miss them; "
-                           "bake again\n",
-                           report.unbounded_node);
+        out +=
+            fmt::format("node {}: its bounding volume does NOT hold all ellipsoids below it, so queries may miss them; "
+                        "bake again\n",
+                        report.unbounded_node);
     if (report.surface_mode) out += "surface mode: the mesh is open, so its triangles were proved and no inside\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;

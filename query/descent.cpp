@@ -7,8 +7,8 @@
 // precision (leaves.cpp). Which node is opened depends on the pair alone, so max_level and budgets only cut the descent
 // off: if level l says separated, so does every deeper one.
 //
-// Sound because a node's bounding volume holds all leaves below it: if B is apart from A's child i, no leaf under B meets
-// one under that child.
+// Sound because a node's bounding volume holds all leaves below it: if B is apart from A's child i, no leaf under B
+// meets one under that child.
 //
 // Depth first, and of the children that meet, that with the deepest overlap first: bodies that touch are found out
 // soon, and for bodies that do not the order makes no difference.
@@ -63,9 +63,10 @@ private:
     // One of the bodies, as that whose children are tested.
     struct Side {
         Side(const Body& body, const LatticePose& other_to_here)
-            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)), hulls(body.tree.has_triangles() ? body.tree.hull(0) : nullptr),
-              step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from), limit_from(body.limit_from),
-              pose(other_to_here), per_step(power_of_two(-step_exponent)) {}
+            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)),
+              hulls(body.tree.has_triangles() ? body.tree.hull(0) : nullptr), step_exponent(body.lattice.step_exponent),
+              leaves_from(body.leaves_from), limit_from(body.limit_from), pose(other_to_here),
+              per_step(power_of_two(-step_exponent)) {}
         // As queries take it: bounding blocks above the last level.
         const std::byte* block(uint32_t slot) const {
             return (slot < leaves_from ? bounding_blocks : blocks) + size_t{slot / kBlockLanes} * kBlockBytes;

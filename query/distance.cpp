@@ -72,9 +72,9 @@ private:
     // One of the bodies, as that whose children are tested.
     struct Side {
         Side(const Body& body, const LatticePose& other_to_here)
-            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)), step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from),
-              limit_from(body.limit_from), pose(other_to_here), step(power_of_two(step_exponent)),
-              per_step(power_of_two(-step_exponent)) {
+            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)),
+              step_exponent(body.lattice.step_exponent), leaves_from(body.leaves_from), limit_from(body.limit_from),
+              pose(other_to_here), step(power_of_two(step_exponent)), per_step(power_of_two(-step_exponent)) {
             if (body.tree.has_triangles()) triangles = body.tree.triangle_bytes(), hulls = body.tree.hull(0);
             triangle_bytes = static_cast<uint32_t>(3 * index_bytes(body.tree.vertex_count()));
             std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);

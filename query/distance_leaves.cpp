@@ -110,8 +110,8 @@ void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, Triangle
             return;
         }
     }
-    const LeafDistance found = distance_of_leaves(a.tree, in_a, b.tree, in_b, b_to_a,
-                                                  {limit, options.tolerance_absolute, options.tolerance_relative}, normal);
+    const LeafDistance found = distance_of_leaves(
+        a.tree, in_a, b.tree, in_b, b_to_a, {limit, options.tolerance_absolute, options.tolerance_relative}, normal);
     stats.triangle_tests += found.pair_tests;
     const bool meet = found.nearest.upper < kInfinity && !(found.nearest.lower > 0);
     skipped = std::min(skipped, meet ? 0 : std::max(found.lower, bound));

@@ -56,8 +56,8 @@ struct DistanceSearch {
     uint64_t left() const { return options.max_pair_tests - std::min(options.max_pair_tests, stats.tests()); }
     double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
 
-    /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing done,
-    /// if the budget may not suffice.
+    /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing
+    /// done, if the budget may not suffice.
     bool decide(uint32_t node_a, uint32_t node_b, double bound) noexcept;
     /// The same for what an earlier query found, which is not trusted to be of these trees.
     bool try_first(const MeetingPair& pair) noexcept;

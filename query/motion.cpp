@@ -92,7 +92,8 @@ dmat3 MovingBody::rotation(double t) const noexcept {
 }
 
 PairMotion::PairMotion(const Motion& a, const Motion& b) noexcept
-    : a_(a), b_(b), start_(relative_pose(a.start, b.start)), between_(to_double(b.start.translation) - to_double(a.start.translation)),
+    : a_(a), b_(b), start_(relative_pose(a.start, b.start)),
+      between_(to_double(b.start.translation) - to_double(a.start.translation)),
       lengths_(glm::length(between_) + 2 * (glm::length(a_.center()) + glm::length(b_.center())) +
                glm::length(a_.linear()) + glm::length(b_.linear())) {}
 

@@ -62,7 +62,8 @@ struct Cast {
             if (found) still_open.length = best.t;
             return hit_within(double{options.margin}, still_open, leaf);
         };
-        if (triangles.count == 0 || growth) return take(hit_by(place(growth ? body.tree.ellipsoid(at) : body.tree.bound(at))), kNoTriangle);
+        if (triangles.count == 0 || growth)
+            return take(hit_by(place(growth ? body.tree.ellipsoid(at) : body.tree.bound(at))), kNoTriangle);
         bool taken = false;
         stats.triangle_tests += triangles.count;
         for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)

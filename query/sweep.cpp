@@ -282,7 +282,8 @@ SweepResult run(query::SweepSearch& q, const Motion& motion_a) {
     query::search(q);
     out.time_lower = q.complete ? q.horizon : std::min(q.open, q.horizon);
     if (q.complete) out.verdict = q.found ? Verdict::overlapping : Verdict::separated;
-    if (q.enclosure == Verdict::overlapping) out.verdict = Verdict::overlapping, out.enclosed = !q.found, out.time_lower = 0;
+    if (q.enclosure == Verdict::overlapping)
+        out.verdict = Verdict::overlapping, out.enclosed = !q.found, out.time_lower = 0;
     q.stats.deepest_level = std::max(q.a.deepest_level(), q.b.deepest_level());
     out.stats = q.stats;
     if (out.enclosed) {

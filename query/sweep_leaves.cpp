@@ -29,15 +29,15 @@ using glm::dmat3;
 using glm::dvec3;
 
 constexpr double kTolerance = 1e-4; // of the smaller body, if none is given
-// The least tolerance. A step that begins while upper > reached gains if the gap along n exceeds the target by more than
-// its own rounding: the gap is `lower`, reached - target half of the tolerance, so it does if that is above upper - lower
-// and the rounding. With S all lengths that enter, pieces whose edges are nearly parallel (slivers, and boxes side by
-// side) have upper - lower of up to sqrt(u) S / 4, u = 2^-53, 2.6e-9 S: closest points of two edges are found by a
-// quotient of a / sin^2 of their angle, whose error u S / sin^2 moves them along the edges by that much, and apart by
-// sin of the angle times as much, or the whole edge's: worst where sin^2 = u. (2e-9 S was the most in triangle_distance_
-// test's; ellipsoids: 1e-9 of their sizes.) So 2^-27 S is enough, 7.5e-9 S; taken as 2^-24 of both sizes for pieces near
-// their bodies' origins, and 2^-27 of the lengths for those that are not.
-// Motion that turns far rounds more (motion.hpp).
+// The least tolerance. A step that begins while upper > reached gains if the gap along n exceeds the target by more
+// than its own rounding: the gap is `lower`, reached - target half of the tolerance, so it does if that is above upper
+// - lower and the rounding. With S all lengths that enter, pieces whose edges are nearly parallel (slivers, and boxes
+// side by side) have upper - lower of up to sqrt(u) S / 4, u = 2^-53, 2.6e-9 S: closest points of two edges are found
+// by a quotient of a / sin^2 of their angle, whose error u S / sin^2 moves them along the edges by that much, and apart
+// by sin of the angle times as much, or the whole edge's: worst where sin^2 = u. (2e-9 S was the most in
+// triangle_distance_ test's; ellipsoids: 1e-9 of their sizes.) So 2^-27 S is enough, 7.5e-9 S; taken as 2^-24 of both
+// sizes for pieces near their bodies' origins, and 2^-27 of the lengths for those that are not. Motion that turns far
+// rounds more (motion.hpp).
 constexpr double kLeastOfSizes = 0x1p-24, kLeastOfLengths = 0x1p-27, kLeastOfTurns = 0x1p-38;
 constexpr double kRoundDown = 1 - 0x1p-40; // of times: far above what rounds in them
 constexpr double kGoodEnough = 0.01;       // what of a gap need not be used up
@@ -138,9 +138,8 @@ SweepSearch::SweepSearch(const TreeView& tree_a, const Motion& motion_a, const T
     const PlacedEllipsoid x = place(a.tree.root()), y = place(b.tree.root(), now.b_to_a);
     const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);
     const double turned = motion.a().speed() + motion.b().speed();
-    const double tolerance =
-        std::max({asked, kLeastOfSizes * (x.size + y.size),
-                  std::max(kLeastOfLengths, kLeastOfTurns * (1 + turned)) * (x.reach + y.reach)});
+    const double tolerance = std::max({asked, kLeastOfSizes * (x.size + y.size),
+                                       std::max(kLeastOfLengths, kLeastOfTurns * (1 + turned)) * (x.reach + y.reach)});
     target = options.margin + tolerance / 2, reached = options.margin + tolerance;
 }
 

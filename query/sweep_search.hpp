@@ -45,8 +45,8 @@ struct SweepSearch {
 
     /// At the start, does one body hold a part of the other? Settled before the search, as in distance_search.hpp.
     Verdict enclosure = Verdict::separated;
-    bool complete = false;  ///< no budget ran out
-    double open = 1;        ///< what is left of the search keeps apart until then
+    bool complete = false; ///< no budget ran out
+    double open = 1;       ///< what is left of the search keeps apart until then
     /// The earliest meeting found, or 1.
     double horizon = 1;
     bool found = false;

@@ -25,11 +25,12 @@ struct TriangleDistance {
     double upper;          // nor farther; infinite if a pose was not finite
     glm::dvec3 on_a, on_b; // points of the triangles, in A's frame, `upper` apart but for rounding
     // From A to B, of any length: along it the gap is `lower`. The way from on_a to on_b loses its digits sooner: where
-    // edges are nearly parallel, points along them are equally near, and one pair of them says nothing of the direction.
+    // edges are nearly parallel, points along them are equally near, and one pair of them says nothing of the
+    // direction.
     glm::dvec3 normal{0, 0, 0};
 };
-/// With the same margin, `lower` is positive only if apart() of triangle.hpp holds, and always if it does. The margin is
-/// a parameter only so that the tests can show that wrong ones are caught.
+/// With the same margin, `lower` is positive only if apart() of triangle.hpp holds, and always if it does. The margin
+/// is a parameter only so that the tests can show that wrong ones are caught.
 TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, double margin = kSeparationMargin) noexcept;
 /// A lower bound from one direction n, of length 1 but for rounding, pointing from A to B.
 double gap_along(const PlacedTriangle& a, const PlacedTriangle& b, const glm::dvec3& n) noexcept;

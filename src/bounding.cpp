@@ -58,7 +58,8 @@ struct Fit {
     Ellipsoid thickened(double share) const {
         const double more = share * share * (shape[0][0] + shape[1][1] + shape[2][2]);
         const double l11 = std::sqrt(shape[0][0] + more), l21 = shape[1][0] / l11, l31 = shape[2][0] / l11;
-        const double l22 = std::sqrt(std::max(shape[1][1] - l21 * l21, 0.0) + more), l32 = (shape[2][1] - l31 * l21) / l22;
+        const double l22 = std::sqrt(std::max(shape[1][1] - l21 * l21, 0.0) + more),
+                     l32 = (shape[2][1] - l31 * l21) / l22;
         const double l33 = std::sqrt(std::max(shape[2][2] - l31 * l31 - l32 * l32, 0.0) + more);
         const auto round = [](double x) { return static_cast<float>(x); };
         return {{round(center[0]), round(center[1]), round(center[2])},
@@ -135,7 +136,8 @@ Fit around(const std::vector<Ellipsoid>& ellipsoids) {
             if (const double square = fit.radial_squared(p); square > kEnough * kEnough) out.push_back({square, p});
         }
         if (out.empty()) break;
-        std::stable_sort(out.begin(), out.end(), [](const Farthest& x, const Farthest& y) { return x.square > y.square; });
+        std::stable_sort(out.begin(), out.end(),
+                         [](const Farthest& x, const Farthest& y) { return x.square > y.square; });
         for (size_t i = 0; i < std::min(out.size(), kMostAdded); ++i) points.push_back(out[i].point);
         fit = around(points);
     }

@@ -1,5 +1,6 @@
-// Bounding volumes of the inner nodes of a tree without triangles: for each a small ellipsoid, and the box, that hold all
-// ellipsoids below it. Its own, which approximates the solid, does not: those below stick out by a third of its size.
+// Bounding volumes of the inner nodes of a tree without triangles: for each a small ellipsoid, and the box, that hold
+// all ellipsoids below it. Its own, which approximates the solid, does not: those below stick out by a third of its
+// size.
 #pragma once
 
 #include "src/format.hpp"

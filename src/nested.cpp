@@ -1,13 +1,14 @@
-// Where the outer ellipsoid is the unit ball, the inner one is {d + M u : |u| <= 1}. With the eigenvalues m of M^T M, and
-// b = M^T d in their axes, for any l above the largest m
+// Where the outer ellipsoid is the unit ball, the inner one is {d + M u : |u| <= 1}. With the eigenvalues m of M^T M,
+// and b = M^T d in their axes, for any l above the largest m
 //     |d + M u|^2 <= |d|^2 + l + sum of b_i^2 / (l - m_i)    for all |u| <= 1,
 // and the least such bound is the truth (the S-lemma; Boyd and Vandenberghe 2004, appendix B). Its derivative by l,
 // 1 - sum of (b_i / (l - m_i))^2, grows: bisection.
 //
 // Rounding. u = 2^-53, c = |L| |L^-1| of the outer ellipsoid. Forward substitution solves a system that is wrong by 4 u
-// |L| (Higham, Accuracy and Stability, section 8.1), so d and M are wrong by 4 u c of themselves, and a radial coordinate
-// by 4 u c (|d| + |M|) <= 12 u c times the largest. Eigenvalues and b add some 30 u, and where the derivative is not
-// negative, an m that is wrong by e moves the bound by no more than e. 2^-46 (c + 4), 128 u, is added.
+// |L| (Higham, Accuracy and Stability, section 8.1), so d and M are wrong by 4 u c of themselves, and a radial
+// coordinate by 4 u c (|d| + |M|) <= 12 u c times the largest. Eigenvalues and b add some 30 u, and where the
+// derivative is not negative, an m that is wrong by e moves the bound by no more than e. 2^-46 (c + 4), 128 u, is
+// added.
 #include "src/nested.hpp"
 
 #include "src/symmetric3.hpp"
@@ -23,7 +24,8 @@ constexpr int kBisections = 40;
 } // namespace
 
 Outer::Outer(const Ellipsoid& e) noexcept
-    : center_{e.center.x, e.center.y, e.center.z}, diagonal_{e.l11, e.l22, e.l33}, l21_(e.l21), l31_(e.l31), l32_(e.l32) {
+    : center_{e.center.x, e.center.y, e.center.z}, diagonal_{e.l11, e.l22, e.l33}, l21_(e.l21), l31_(e.l31),
+      l32_(e.l32) {
     double square = l21_ * l21_ + l31_ * l31_ + l32_ * l32_, inverse = 0;
     for (const double x : diagonal_) square += x * x;
     for (size_t i = 0; i < 3; ++i) {

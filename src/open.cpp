@@ -119,7 +119,8 @@ Result<Levels> check_levels(std::span<const std::byte> bytes, uint32_t level_cou
     for (uint32_t l = 0; l < level_count; ++l) {
         const size_t at = kHeaderBytes + l * kLevelBytes;
         if (load_le<uint32_t>(h + at + kLevelFirstBlock) != blocks) return bad("levels are not consecutive", at);
-        const uint64_t begin = end_of_blocks(level_count, bounding_blocks + blocks), end = load_le<uint64_t>(h + at + kLevelEndByte);
+        const uint64_t begin = end_of_blocks(level_count, bounding_blocks + blocks),
+                       end = load_le<uint64_t>(h + at + kLevelEndByte);
         const uint64_t more = end > begin ? (end - begin) / kBlockBytes : 0;
         if (more == 0 || more > kMaxBlocks - blocks || end != begin + more * kBlockBytes || (l == 0 && more != 1))
             return bad("wrong byte count of a level", at + kLevelEndByte);
@@ -164,8 +165,8 @@ public:
         return count & kTriangleLeaf ? 0 : count;
     }
 
-    // The bounding block at `where` of block `b`, which has been found to be sound: the same nodes, and their ellipsoids
-    // and boxes are sound, too.
+    // The bounding block at `where` of block `b`, which has been found to be sound: the same nodes, and their
+    // ellipsoids and boxes are sound, too.
     Result<void> bounding_block(uint32_t b, size_t where) const {
         const std::byte *const from = file_ + where, *const nodes = file_ + at(b);
         uint32_t lane = 0;
@@ -175,7 +176,8 @@ public:
                 load_le<uint32_t>(from + first) != load_le<uint32_t>(nodes + first))
                 return bad("a bounding block has other nodes than its block", where + first);
             if (nodes[kBlockCount + lane] == std::byte{0} && !same_ellipsoid(from, nodes, lane))
-                return bad("a bounding block has another leaf than its block", where + block_offset(kBlockCenter, 0, lane));
+                return bad("a bounding block has another leaf than its block",
+                           where + block_offset(kBlockCenter, 0, lane));
             if (const auto sound = shape(where, lane); !sound) return sound;
         }
         if (const auto sound = box_frame(where); !sound) return sound;
@@ -298,8 +300,8 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     if (load_le<uint32_t>(h + kAtNodeCount) != nodes) return bad("wrong node count", kAtNodeCount);
     const uint32_t vertex_count = load_le<uint32_t>(h + kAtVertexCount);
     const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
-    const uint64_t total =
-        end_of_blocks(level_count, bounding_blocks + blocks) + (exact ? section_bytes(blocks, vertex_count, triangle_count) : 0);
+    const uint64_t total = end_of_blocks(level_count, bounding_blocks + blocks) +
+                           (exact ? section_bytes(blocks, vertex_count, triangle_count) : 0);
     if (load_le<uint64_t>(h + kAtTotalSize) != total) return bad("wrong total size", kAtTotalSize);
     if (present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
     const uint64_t present_end = load_le<uint64_t>(h + kHeaderBytes + (present - 1) * kLevelBytes + kLevelEndByte);

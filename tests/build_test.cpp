@@ -576,10 +576,10 @@ TEST(Verify, FailsWhenABoundingVolumeHoldsTooLittle) {
         EXPECT_TRUE(changed);
         return *verify(*changed, mesh.view());
     };
-    const std::pair<size_t, int> changes[] = {{49, -2},    // l11 of the root: 2 % less
-                                              {1, 2},      // its center
-                                              {192, 2},    // its box, from below
-                                              {216, -2}};  // and from above
+    const std::pair<size_t, int> changes[] = {{49, -2},   // l11 of the root: 2 % less
+                                              {1, 2},     // its center
+                                              {192, 2},   // its box, from below
+                                              {216, -2}}; // and from above
     for (const auto& [at, more] : changes) {
         const VerifyReport smaller = with(at, more);
         EXPECT_FALSE(smaller.bounded) << at;

@@ -139,9 +139,7 @@ public:
     bool meets() { return !apart(0, 0) && descend(0, 0, 0); }
 
 private:
-    bool apart(uint32_t i, uint32_t j) {
-        return collide(a_.bound(i), q_.a, b_.bound(j), q_.b) == Verdict::separated;
-    }
+    bool apart(uint32_t i, uint32_t j) { return collide(a_.bound(i), q_.a, b_.bound(j), q_.b) == Verdict::separated; }
     std::vector<uint32_t> below(const TreeView& tree, uint32_t node, uint32_t level) const {
         const ChildRange children = level >= max_level_ ? ChildRange{} : tree.children(node);
         std::vector<uint32_t> out;

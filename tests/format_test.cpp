@@ -37,7 +37,7 @@ using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
 constexpr size_t kTable = 200, kRow = 60;
-constexpr size_t kBounding = 384; // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kBounding = 384;               // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
 constexpr size_t kBlocks = kBounding + 2 * 256; // of the exact one, which has no bounding blocks, kBounding
 constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
 constexpr size_t kExactBlock1 = kBounding + 256, kExactBlock2 = kExactBlock1 + 256, kExactEnd = kExactBlock2 + 256;
@@ -538,51 +538,51 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
         {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
-        {kBounding - 4, {1}, ErrorCode::bad_file, kBounding - 4},             // padding
+        {kBounding - 4, {1}, ErrorCode::bad_file, kBounding - 4},               // padding
         {kBounding - 1, {1}, ErrorCode::bad_file, kBounding - 1},
-        {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 160},       // other children than in the block
-        {kBounding + 160, {16}, ErrorCode::bad_file, kBounding + 160},      // another first child
-        {kBounding + 48, {0, 0}, ErrorCode::bad_file, kBounding + 48},      // no extent
-        {kBounding + 144, {101}, ErrorCode::bad_file, kBounding + 144},     // exponent
-        {kBounding + 192, {255}, ErrorCode::bad_file, kBounding + 192},     // lower corner above the upper one
-        {kBounding + 243, {16}, ErrorCode::bad_file, kBounding + 240},      // box origin
-        {kBounding + 50, {1}, ErrorCode::bad_file, kBounding + 50},         // beside the root
-        {kBounding + 256 + 2, {1}, ErrorCode::bad_file, kBounding + 258},   // another center of a leaf
-        {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},     // first child
-        {counts, {4}, ErrorCode::bad_file, counts},                   // more children than the degree
-        {counts, {2}, ErrorCode::bad_file, kBlock1},                  // children that are not the next level
-        {kBlock1 + 144, {101}, ErrorCode::bad_file, kBlock1 + 144},   // exponent
-        {kBlock1 + 48, {0, 0}, ErrorCode::bad_file, kBlock1 + 48},    // no extent
-        {kBlock1 + 66, {0, 0}, ErrorCode::bad_file, kBlock1 + 66},    // of the other, along y
-        {kBlock1 + 164, {1}, ErrorCode::bad_file, kBlock1 + 164},     // a leaf's first child
-        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},         // a leaf of no triangles
-        {counts + 1, {129}, ErrorCode::bad_file, counts + 1},         // triangles in a tree without
-        {kBlocks + 2, {1}, ErrorCode::bad_file, kBlocks + 2},         // beside the root: center
-        {kBlocks + 80 + 15, {1}, ErrorCode::bad_file, kBlocks + 95},  // diagonal of the last lane
-        {kBlock1 + 96 + 4, {1}, ErrorCode::bad_file, kBlock1 + 100},  // off-diagonal
-        {kBlock1 + 144 + 2, {1}, ErrorCode::bad_file, kBlock1 + 146}, // exponent
-        {counts + 2, {1}, ErrorCode::bad_file, counts + 2},           // count
-        {kBlock2 + 191, {1}, ErrorCode::bad_file, kBlock2 + 191},     // first
-        {kBlocks + 193, {1}, ErrorCode::bad_file, kBlocks + 193},     // box
-        {kBlock1 + 192, {255}, ErrorCode::bad_file, kBlock1 + 192},   // lower corner above the upper one
-        {kBlocks + 243, {16}, ErrorCode::bad_file, kBlocks + 240},    // box origin
-        {kBlocks + 252, {23}, ErrorCode::bad_file, kBlocks + 252},    // box step
-        {kBlocks + 255, {1}, ErrorCode::bad_file, kBlocks + 255},     // reserved
+        {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 160},     // other children than in the block
+        {kBounding + 160, {16}, ErrorCode::bad_file, kBounding + 160},    // another first child
+        {kBounding + 48, {0, 0}, ErrorCode::bad_file, kBounding + 48},    // no extent
+        {kBounding + 144, {101}, ErrorCode::bad_file, kBounding + 144},   // exponent
+        {kBounding + 192, {255}, ErrorCode::bad_file, kBounding + 192},   // lower corner above the upper one
+        {kBounding + 243, {16}, ErrorCode::bad_file, kBounding + 240},    // box origin
+        {kBounding + 50, {1}, ErrorCode::bad_file, kBounding + 50},       // beside the root
+        {kBounding + 256 + 2, {1}, ErrorCode::bad_file, kBounding + 258}, // another center of a leaf
+        {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},         // first child
+        {counts, {4}, ErrorCode::bad_file, counts},                       // more children than the degree
+        {counts, {2}, ErrorCode::bad_file, kBlock1},                      // children that are not the next level
+        {kBlock1 + 144, {101}, ErrorCode::bad_file, kBlock1 + 144},       // exponent
+        {kBlock1 + 48, {0, 0}, ErrorCode::bad_file, kBlock1 + 48},        // no extent
+        {kBlock1 + 66, {0, 0}, ErrorCode::bad_file, kBlock1 + 66},        // of the other, along y
+        {kBlock1 + 164, {1}, ErrorCode::bad_file, kBlock1 + 164},         // a leaf's first child
+        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},             // a leaf of no triangles
+        {counts + 1, {129}, ErrorCode::bad_file, counts + 1},             // triangles in a tree without
+        {kBlocks + 2, {1}, ErrorCode::bad_file, kBlocks + 2},             // beside the root: center
+        {kBlocks + 80 + 15, {1}, ErrorCode::bad_file, kBlocks + 95},      // diagonal of the last lane
+        {kBlock1 + 96 + 4, {1}, ErrorCode::bad_file, kBlock1 + 100},      // off-diagonal
+        {kBlock1 + 144 + 2, {1}, ErrorCode::bad_file, kBlock1 + 146},     // exponent
+        {counts + 2, {1}, ErrorCode::bad_file, counts + 2},               // count
+        {kBlock2 + 191, {1}, ErrorCode::bad_file, kBlock2 + 191},         // first
+        {kBlocks + 193, {1}, ErrorCode::bad_file, kBlocks + 193},         // box
+        {kBlock1 + 192, {255}, ErrorCode::bad_file, kBlock1 + 192},       // lower corner above the upper one
+        {kBlocks + 243, {16}, ErrorCode::bad_file, kBlocks + 240},        // box origin
+        {kBlocks + 252, {23}, ErrorCode::bad_file, kBlocks + 252},        // box step
+        {kBlocks + 255, {1}, ErrorCode::bad_file, kBlocks + 255},         // reserved
     };
     const Case exact_cases[] = {
-        {12, {1}, ErrorCode::bad_file, 116},                                // triangle counts of a tree without
-        {116, {0}, ErrorCode::bad_file, 116},                               // no vertices
-        {116, {8}, ErrorCode::bad_file, 16},                                // more than the size says
-        {120, {0}, ErrorCode::bad_file, 120},                               // no triangles
-        {124, {0}, ErrorCode::bad_file, 124},                               // no component
-        {124, {8}, ErrorCode::bad_file, 124},                               // more than vertices
-        {exact_counts + 1, {0}, ErrorCode::bad_file, exact_counts + 1},                 // a leaf of none
-        {exact_counts + 1, {128}, ErrorCode::bad_file, exact_counts + 1},               // another of none
-        {exact_counts + 1, {130}, ErrorCode::bad_file, kExactBlock2 + 160},            // one that the next leaf has too
-        {kExactBlock2 + 154, {130}, ErrorCode::bad_file, 120},                   // one more than there are
-        {exact_counts, {131}, ErrorCode::bad_file, kExactBlock1 + 160},                // an inner node's children as triangles
-        {kExactEnd + 64 + 49, {1}, ErrorCode::bad_file, kExactEnd + 64 + 49},         // reserved bytes of a hull
-        {kExactEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kExactEnd + 2 * 64 + 63}, // likewise
+        {12, {1}, ErrorCode::bad_file, 116},                                  // triangle counts of a tree without
+        {116, {0}, ErrorCode::bad_file, 116},                                 // no vertices
+        {116, {8}, ErrorCode::bad_file, 16},                                  // more than the size says
+        {120, {0}, ErrorCode::bad_file, 120},                                 // no triangles
+        {124, {0}, ErrorCode::bad_file, 124},                                 // no component
+        {124, {8}, ErrorCode::bad_file, 124},                                 // more than vertices
+        {exact_counts + 1, {0}, ErrorCode::bad_file, exact_counts + 1},       // a leaf of none
+        {exact_counts + 1, {128}, ErrorCode::bad_file, exact_counts + 1},     // another of none
+        {exact_counts + 1, {130}, ErrorCode::bad_file, kExactBlock2 + 160},   // one that the next leaf has too
+        {kExactBlock2 + 154, {130}, ErrorCode::bad_file, 120},                // one more than there are
+        {exact_counts, {131}, ErrorCode::bad_file, kExactBlock1 + 160},       // an inner node's children as triangles
+        {kExactEnd + 64 + 49, {1}, ErrorCode::bad_file, kExactEnd + 64 + 49}, // reserved bytes of a hull
+        {kExactEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kExactEnd + 2 * 64 + 63},            // likewise
         {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
         {section + 8 + 7 * 12 + 2 * 6 + 4, {7}, ErrorCode::bad_file, section + 8 + 7 * 12 + 12}, // no such vertex
     };

@@ -610,8 +610,8 @@ TEST(Motion, BetweenTwoPosesIsTheSmallerTurn) {
     }
 }
 
-// However small the tolerance, and however ill the closest points of nearly parallel edges are defined: what is reported
-// to meet is as near as the least tolerance.
+// However small the tolerance, and however ill the closest points of nearly parallel edges are defined: what is
+// reported to meet is as near as the least tolerance.
 TEST(Sweep, SliversComeAsNearAsTheLeastTolerance) {
     Random random(3);
     const auto context = std::make_unique<QueryContext>();

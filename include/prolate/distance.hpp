@@ -63,9 +63,9 @@ struct DistanceResult {
 /// shared trees.
 ///
 /// Anytime: a tight budget widens the bounds, no more. With a larger max_pair_tests, lower never falls, upper never
-/// rises, and a verdict stays; the same holds of the bounds for max_level but for the tolerance. Whether one body holds a
-/// part of the other is settled first, where it may. A pose that is not finite, or whose quaternion is zero,
-/// leaves everything open: undecided, 0 <= distance <= infinity.
+/// rises, and a verdict stays; the same holds of the bounds for max_level but for the tolerance. Whether one body holds
+/// a part of the other is settled first, where it may. A pose that is not finite, or whose quaternion is zero, leaves
+/// everything open: undecided, 0 <= distance <= infinity.
 ///
 /// Branch and bound over pairs of nodes; Johnson and Cohen 1998, and query/distance.cpp.
 DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,

@@ -10,7 +10,8 @@
 //  - a tree without triangles is the union of its leaf ellipsoids, exactly as they decode, filled. The leaves of a
 //    prefix are the nodes of its last level. Inner nodes do not matter: they only tell soon where no leaf is.
 //  - an exact tree is its triangles, and if its mesh is closed, all that they enclose.
-// (A prefix of an exact tree covers the surface and is no body: of it, only *separated* and lower bounds are certified.)
+// (A prefix of an exact tree covers the surface and is no body: of it, only *separated* and lower bounds are
+// certified.)
 //
 // What is certified, for trees that cover their solids:
 //  - separated:   a plane was found between every pair of leaves, or of nodes above them, beyond the rounding error of
@@ -23,13 +24,13 @@
 //  - overlapping: two triangles have a common point (coplanar and touching ones too; or come nearer than rounding error
 //                 can tell apart, about 1e-13 of the lengths that enter), or a vertex of one body lies inside the
 //                 other. Against a tree without triangles, its leaf ellipsoids take the triangles' place.
-// Two leaves, or triangles, are decided on by one test with the bodies in one order, so all queries of the same two bodies
-// give the same verdict to the bit: collide(), collide_all() (`found`), distance(), contacts(), and those of a world.
-// sweep() has a tolerance: where it separates collide() does, and where that overlaps at the start, it says so.
+// Two leaves, or triangles, are decided on by one test with the bodies in one order, so all queries of the same two
+// bodies give the same verdict to the bit: collide(), collide_all() (`found`), distance(), contacts(), and those of a
+// world. sweep() has a tolerance: where it separates collide() does, and where that overlaps at the start, it says so.
 //
-// A pose that is not finite, or whose quaternion is zero, never separates. Lengths are defined for every number: margins,
-// radii, half extents and max_distance that are negative count as 0, and NaN as infinite; with an infinite margin, all
-// bodies meet. Tolerances that are negative or NaN count as 0.
+// A pose that is not finite, or whose quaternion is zero, never separates. Lengths are defined for every number:
+// margins, radii, half extents and max_distance that are negative count as 0, and NaN as infinite; with an infinite
+// margin, all bodies meet. Tolerances that are negative or NaN count as 0.
 #pragma once
 
 #include <prolate/tree.hpp>
@@ -45,9 +46,10 @@ enum class Verdict : uint8_t { separated, overlapping, undecided };
 /// Limits of a query.
 struct QueryOptions {
     /// Look no deeper than this level of either tree (0 = roots only): where the descent would go deeper, two nodes
-    /// that the culling test cannot tell apart count as meeting, with all that may lie below them. Which pairs of nodes are tested does not depend on it,
-    /// so deeper never contradicts shallower: a shallow *separated* holds at every depth. Ellipsoids of exact trees
-    /// cover surfaces; short of the leaves nothing is said of what they enclose, nor is it by a prefix of such a tree.
+    /// that the culling test cannot tell apart count as meeting, with all that may lie below them. Which pairs of nodes
+    /// are tested does not depend on it, so deeper never contradicts shallower: a shallow *separated* holds at every
+    /// depth. Ellipsoids of exact trees cover surfaces; short of the leaves nothing is said of what they enclose, nor
+    /// is it by a prefix of such a tree.
     uint32_t max_level = kMaxLevels;
     /// Stop before this many tests, of nodes and of triangles together, would be exceeded: QueryStats::tests().
     uint64_t max_pair_tests = UINT64_MAX;

@@ -1,7 +1,8 @@
 // Where does a ray first meet a body?
 //
 // query.hpp says what the verdicts certify, the ray in the place of the second body:
-//  - separated:   no point of the ray lies in a leaf ellipsoid of a tree without triangles, nor on a triangle of an exact
+//  - separated:   no point of the ray lies in a leaf ellipsoid of a tree without triangles, nor on a triangle of an
+//  exact
 //                 tree; with a margin, none comes as near to it as that.
 //  - overlapping: the ray meets a leaf ellipsoid, or a triangle, or comes nearer to it than rounding error can tell
 //                 apart (about 1e-12 of the lengths that enter: the body's size and the distance of the ray's origin).

@@ -12,8 +12,8 @@
 
 namespace prolate {
 
-/// All shapes are placed in the world. Lengths in metres; radii and half extents may be 0. Negative ones count as 0; with
-/// infinite or NaN ones, or any other number that is not finite, a shape overlaps all.
+/// All shapes are placed in the world. Lengths in metres; radii and half extents may be 0. Negative ones count as 0;
+/// with infinite or NaN ones, or any other number that is not finite, a shape overlaps all.
 struct Sphere {
     Vec3 center;
     float radius = 1;

@@ -36,8 +36,8 @@ Motion motion_between(const Pose& start, const Pose& end, const Vec3& center = {
 struct SweepOptions {
     /// Bodies that come nearer than margin + tolerance count as meeting, metres; those that pass farther away do not.
     /// More is faster. 0, negative or NaN stand for 1e-4 of the smaller body's size. What is less than 2^-24 of both
-    /// sizes, or than 2^-27 of all lengths that enter (2^-38 times 1 + the angles turned by, if that is more), counts as
-    /// that much. Size: |L| of the root. Lengths: it, and what lies between the root and the origins.
+    /// sizes, or than 2^-27 of all lengths that enter (2^-38 times 1 + the angles turned by, if that is more), counts
+    /// as that much. Size: |L| of the root. Lengths: it, and what lies between the root and the origins.
     double tolerance = 0;
     /// Look no deeper than this level of either tree (0 = roots only): the bodies are then its coarser covers, which
     /// meet no later.
@@ -75,8 +75,9 @@ struct SweepResult {
 /// above, in real numbers: what double precision rounds off is paid for. Symmetric: swapping the bodies swaps the
 /// answer. Thread-safe on shared trees. Of a body at rest, leave linear and angular 0.
 ///
-/// Anytime: with a larger max_pair_tests, time_lower never falls, time_upper never rises, and a verdict stays. A motion that is not finite, turns by more than
-/// kMaxTurn, or starts with a quaternion of zero leaves everything open: undecided, time_lower = 0.
+/// Anytime: with a larger max_pair_tests, time_lower never falls, time_upper never rises, and a verdict stays. A motion
+/// that is not finite, turns by more than kMaxTurn, or starts with a quaternion of zero leaves everything open:
+/// undecided, time_lower = 0.
 ///
 /// Conservative advancement of pairs of nodes, each at its own pace, the earliest first: Mirtich 1996, Zhang et al.
 /// 2007, and query/sweep.cpp.

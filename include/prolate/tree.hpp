@@ -164,9 +164,9 @@ public:
     /// children, which are not there: children() knows.
     const std::byte* block(uint32_t b) const noexcept { return blocks_ + size_t{b} * kBlockBytes; }
 
-    /// The block as queries of the whole tree take it: the same nodes, but in a tree without triangles the ellipsoid and
-    /// the box of an inner node hold those of all nodes below it. Its own ellipsoid does not: it approximates the part
-    /// of the solid that the node stands for, out of which those below stick in other places.
+    /// The block as queries of the whole tree take it: the same nodes, but in a tree without triangles the ellipsoid
+    /// and the box of an inner node hold those of all nodes below it. Its own ellipsoid does not: it approximates the
+    /// part of the solid that the node stands for, out of which those below stick in other places.
     const std::byte* bounding_block(uint32_t b) const noexcept {
         return (b < bounding_count_ ? bounding_blocks_ : blocks_) + size_t{b} * kBlockBytes;
     }

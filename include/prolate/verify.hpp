@@ -20,9 +20,9 @@ struct LevelProof {
 };
 
 struct VerifyReport {
-    bool covered = false;      ///< every level is, and if there is no triangle, `bounded`
-    bool exact = false;        ///< the tree holds triangles
-    bool same_mesh = true;     ///< of an exact tree: they are the mesh's. If not, no level counts as covered.
+    bool covered = false;  ///< every level is, and if there is no triangle, `bounded`
+    bool exact = false;    ///< the tree holds triangles
+    bool same_mesh = true; ///< of an exact tree: they are the mesh's. If not, no level counts as covered.
     /// Of a tree without triangles: the bounding volumes hold all that lies below their nodes. If not, queries may
     /// overlook it, and `unbounded_node` is the first node whose does not.
     bool bounded = true;
@@ -43,8 +43,8 @@ struct VerifyOptions {
 /// clipped to the cell, and its corners inside the solid) lies in one node of the *decoded* tree, because then, an
 /// ellipsoid being convex, everything in between does. To lie in a node is to lie in its ellipsoid and in those of all
 /// nodes above it, which is more than queries need: they get there by the bounding volumes, which are proved to hold
-/// all ellipsoids below. The mesh is given as it was read: it is welded as when the tree was baked, and where that moves
-/// points, they are proved where they stood. A point of the solid in no node ends the proof as a counterexample;
+/// all ellipsoids below. The mesh is given as it was read: it is welded as when the tree was baked, and where that
+/// moves points, they are proved where they stood. A point of the solid in no node ends the proof as a counterexample;
 /// a cell that cannot be decided at 1e-9 of the mesh's size ends it as "not proved". Of an exact tree, the triangles
 /// are compared with the mesh's, and each is looked for in every ellipsoid above it. A prefix of one is proved to cover
 /// the triangles, as in surface mode. Thread-safe. Fails with bad_mesh or cancelled.
