@@ -369,8 +369,8 @@ private:
             Approach free = approach(task, effort, step(most_nodes(levels)));
             if (cancelled()) return;
             const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
-            if (thin(task.children) ||
-                !keep(estimate, free.set.fits.size())) { // what thin parts are uncovered is not in it
+            // The estimate does not see what is left uncovered of thin parts.
+            if (thin(task.children) || !keep(estimate, free.set.fits.size())) {
                 const Solved solved = settle(task, std::move(free));
                 if (cancelled()) return;
                 if (keep(solved.outside, solved.leaves.size())) {

@@ -80,13 +80,12 @@ struct Build {
 /// it were that thick.
 inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kThinnestNodeOfPlace = 0x1p-21;
 
-/// Leaves of a tree of so many levels are at most about 1.3 times as far from the solid, in volume outside it (all of
-/// their union, if the mesh encloses nothing), as the set that `ellipsoids` finds for their number.
-///
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
 /// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
 /// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
-/// Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
+/// With levels, the leaves have at most about 1.3 times the volume outside the solid that the set of as many
+/// `ellipsoids` has (of their union, if the mesh encloses nothing); levels above them may have more outside than the
+/// root. Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 
 } // namespace prolate
