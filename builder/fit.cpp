@@ -159,9 +159,8 @@ Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double to
     for (const Vec& d : sketch_directions().first(8)) {
         size_t low = 0, high = 0;
         for (size_t i = 1; i < n; ++i) {
-            const Vec e = axes.transpose() * d;
-            if (e.dot(points[i]) < e.dot(points[low])) low = i;
-            if (e.dot(points[i]) > e.dot(points[high])) high = i;
+            if (d.dot(points[i]) < d.dot(points[low])) low = i;
+            if (d.dot(points[i]) > d.dot(points[high])) high = i;
         }
         for (const size_t i : {low, high})
             if (weight[i] == 0) weight[i] = 1, ++started;

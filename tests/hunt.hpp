@@ -67,8 +67,8 @@ inline Real length(const Vector& v) {
 
 /// Radii with the largest 1: needles, discs and anything between, up to twice the axis ratio that bakes keep.
 inline constexpr double kLargestRatio = 32768;
-inline Point radii(Random& random) {
-    const double thin = 1 / random.log_in(1, kLargestRatio);
+inline Point radii(Random& random, double most = kLargestRatio) {
+    const double thin = 1 / random.log_in(1, most);
     Point r{};
     switch (random.below(3)) {
     case 0:
@@ -78,10 +78,10 @@ inline Point radii(Random& random) {
         r = {1, random.in(0.5, 1), thin};
         break;
     default:
-        r = scenes::radii(random, random.log_in(1, kLargestRatio));
+        r = scenes::radii(random, random.log_in(1, most));
         break;
     }
-    for (double& x : r) x = std::clamp(x, 1 / kLargestRatio, 1.0);
+    for (double& x : r) x = std::clamp(x, 1 / most, 1.0);
     std::swap(r[0], r[random.below(3)]);
     return r;
 }
