@@ -228,6 +228,8 @@ Result<Mesh> load_or_throw(const char* path, const ImportOptions& options, Impor
     if (const auto finite = check_finite(*polygons, options, report.detail); !finite) return finite.error();
     const auto placement = place(*polygons, options, report);
     if (!placement) return placement.error();
+    if (polygons->unit_is_ignored && placement->scale == Placement{}.scale)
+        report.notes.push_back("its unit is not applied: --unit or --scale makes its numbers metres");
     return to_mesh(*polygons, *placement, report);
 }
 

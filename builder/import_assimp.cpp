@@ -55,13 +55,12 @@ void note_frame(Polygons& out, std::string_view type, const Affine& root) {
     for (size_t k = 1; k < 3; ++k)
         if (std::abs(root.m[1][k]) > std::abs(root.m[1][up])) up = k;
     char words[200];
-    const char* const scaling =
-        std::abs(unit - 1) < 1e-6 ? "" : ", which is not applied: --unit or --scale makes them metres";
     if (type == ".dae")
-        std::snprintf(words, sizeof words, "states a unit of %.6g m%s, and %c up: the axes are kept", unit, scaling,
+        std::snprintf(words, sizeof words, "states a unit of %.6g m, and %c up: the axes are kept", unit,
                       static_cast<char>('x' + up));
     else
         std::snprintf(words, sizeof words, "has z up, as 3DS has it: the axes are kept");
+    out.unit_is_ignored = type == ".dae" && std::abs(unit - 1) > 1e-6;
     out.notes.emplace_back(words);
 }
 

@@ -52,6 +52,7 @@ struct Polygons {
     const char* place_word = "face";
 
     double unit = 1;                 ///< metres of one of the file's units, where the format defines it
+    bool unit_is_ignored = false;    ///< the file states one other than metres, which is not applied
     bool points_are_rounded = false; ///< the reader has single precision where the file may have more
     std::vector<std::string> notes;  ///< one line each: what the file states and what was done about it
 

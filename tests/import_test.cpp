@@ -642,6 +642,10 @@ TEST_F(Import, ScalesMirrorsAndUnits) {
     ASSERT_FALSE(report.notes.empty());
     EXPECT_NE(report.notes[0].find("0.0254 m"), std::string::npos) << report.notes[0];
     EXPECT_NE(report.notes[0].find("z up"), std::string::npos) << report.notes[0];
+    ASSERT_EQ(report.notes.size(), 2u);
+    EXPECT_NE(report.notes[1].find("not applied"), std::string::npos) << report.notes[1];
+    load(millimetres, {.unit = 0.0254}, report);
+    EXPECT_EQ(report.notes.size(), 1u) << "told, and applied";
     EXPECT_NE(hash_mesh_file(path.c_str()), hash_mesh_file(path.c_str(), {.unit = 0.001}));
 }
 
