@@ -37,7 +37,7 @@ struct Reach {
 };
 
 /// Of how large the body is along an axis, what may be lost on each side.
-inline constexpr double kReachTolerance = 0x1p-8;
+inline constexpr double kReachTolerance = 0x1p-9;
 
 /// The pose must be finite. The last argument is there only so that the tests can show that a wrong one is caught.
 Reach reach(const TreeView& tree, const RelativePose& to_world, double tolerance = kReachTolerance,

@@ -19,7 +19,7 @@ using query::BoundsTree;
 constexpr uint32_t kMostBodies = uint32_t{1} << 30; // the tree's nodes, twice as many, have 32-bit numbers
 constexpr uint32_t kGrain = 64;                     // boxes
 constexpr float kLargest = 4;                       // a box has at most so many times the slack it began with
-constexpr double kTolerance = 0x1p-5;               // of boxes, small beside the slack: half as dear as bounds()
+constexpr double kTolerance = 0x1p-6;               // of boxes, small beside the slack: half as dear as bounds()
 
 constexpr Error kOutOfMemory{ErrorCode::out_of_memory, "the world's memory resource gave no more", 0};
 constexpr Error kBadId{ErrorCode::bad_id, "no body has this id, or has it any more", 0};

@@ -113,7 +113,7 @@ TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
 }
 
 TEST(Bits, Collide) {
-    expect_bits(1067878396874300886u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(9362485285461351817u, [](Bits& bits, const Scenes::Pair& p) {
         const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
         PairCache cache;
@@ -126,7 +126,7 @@ TEST(Bits, Collide) {
 }
 
 TEST(Bits, CollideAll) {
-    expect_bits(10359879360881518780u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(8282181647875842399u, [](Bits& bits, const Scenes::Pair& p) {
         MeetingPair pairs[16];
         const CollideAllResult r = collide_all(p.a, p.pose_a, p.b, p.pose_b, pairs, context());
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats);
@@ -135,7 +135,7 @@ TEST(Bits, CollideAll) {
 }
 
 TEST(Bits, Distance) {
-    expect_bits(16209500465787780907u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(2731207374674907494u, [](Bits& bits, const Scenes::Pair& p) {
         const DistanceResult r = distance(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.lower, r.upper, r.point_a, r.point_b, r.normal, r.pair, r.stats);
     });
@@ -158,7 +158,7 @@ TEST(Bits, Contacts) {
 }
 
 TEST(Bits, Sweep) {
-    expect_bits(16546088404067942958u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(13677036498990831651u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_b.translation, to = p.pose_a.translation;
         const Motion a{p.pose_a, {}, {0.3f, -1, 0.2f}, {}};
         const Motion b{p.pose_b, {to.x - from.x, to.y - from.y, to.z - from.z}, {1, 2, -0.5f}, {}};
@@ -169,7 +169,7 @@ TEST(Bits, Sweep) {
 }
 
 TEST(Bits, Raycast) {
-    expect_bits(8386464316124557172u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(7325182306009168009u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
         const Ray ray{from, {to.x - from.x, to.y - from.y, to.z - from.z}, 2};
         for (const float margin : {0.0f, 0.05f}) {
@@ -180,7 +180,7 @@ TEST(Bits, Raycast) {
 }
 
 TEST(Bits, Overlap) {
-    expect_bits(2107436342853634743u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(10210352043080013176u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
         const auto add = [&](const auto& shape) {
             const OverlapResult r = overlap(p.b, p.pose_b, shape, context());
