@@ -602,9 +602,8 @@ private:
         for (uint32_t left = levels; !groups.empty(); --left) { // breadth-first: children of a node are consecutive
             std::vector<std::vector<std::vector<uint32_t>>> parts(groups.size());
             const size_t most = levels == 0 ? 0 : static_cast<size_t>(std::min(most_nodes(left - 1), 0x1p32));
-            parallel_for(size_t{0}, groups.size(), [&](size_t g) {
-                parts[g] = parts_of(groups[g].members, most, fits, sketches, touching);
-            });
+            parallel_for(size_t{0}, groups.size(),
+                         [&](size_t g) { parts[g] = parts_of(groups[g].members, most, fits, sketches, touching); });
             std::vector<Group> next;
             uint32_t level = 0;
             for (size_t g = 0; g < groups.size(); ++g) {

@@ -33,7 +33,7 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 constexpr double kSmallest = 1e-24; // diagonal: a leaf of kThinnestNodeOfMesh needs an exponent that the format has
-constexpr float kWeldSpacings = 8;                   // of kDefaultWeld
+constexpr float kWeldSpacings = 8;  // of kDefaultWeld
 
 bool is_finite(const Vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -233,7 +233,8 @@ Result<CleanMesh> clean_or_throw(MeshView input, float weld) {
     for (size_t i = 0; i < input.vertices.size(); ++i) {
         if (!is_finite(input.vertices[i])) return Error{ErrorCode::bad_mesh, "vertex coordinate is not finite", i};
         if (!within_limit(input.vertices[i]))
-            return Error{ErrorCode::bad_mesh, "vertex coordinate beyond 1.9e22 m (2^74); give the mesh in another unit", i};
+            return Error{ErrorCode::bad_mesh, "vertex coordinate beyond 1.9e22 m (2^74); give the mesh in another unit",
+                         i};
     }
     for (size_t i = 0; i < input.triangles.size(); ++i)
         for (const uint32_t corner : input.triangles[i])

@@ -95,8 +95,8 @@ bool is_standard_input(const std::string& path);
 /// The first `most` bytes of a file, or of standard input. Fails with io, also for a folder.
 Result<std::string> read_file(const std::string& path, size_t most = SIZE_MAX);
 
-/// Reads a mesh or a tree, also from standard input; reports the reason and sets `code` if it cannot. What is to be known
-/// of the import is noted.
+/// Reads a mesh or a tree, also from standard input; reports the reason and sets `code` if it cannot. What is to be
+/// known of the import is noted.
 std::optional<Mesh> read_mesh(const std::string& path, int& code, const ImportOptions& options = {});
 std::optional<Tree> read_tree(const std::string& path, int& code);
 

@@ -10,8 +10,8 @@
 set -euo pipefail
 cd "$(mktemp -d)" && trap 'rm -rf "$PWD"' EXIT
 apt-get download -q assimp-utils=5.2.5~ds0-1+b1 libassimp5=5.2.5~ds0-1+b1 libdraco7=1.5.5+dfsg-2 libminizip1=1.1-8+deb12u1
-for package in *.deb; do dpkg -x "$package" root; done
-LD_LIBRARY_PATH=$(echo "$PWD"/root/usr/lib/*-linux-gnu) && export LD_LIBRARY_PATH
+for package in *.deb; do dpkg -x "$package" unpacked; done
+LD_LIBRARY_PATH=$(echo "$PWD"/unpacked/usr/lib/*-linux-gnu) && export LD_LIBRARY_PATH
 cat >check.py <<'PYTHON'
 import math, random, subprocess
 rng, lost, worst = random.Random(1), 0, 0
@@ -49,7 +49,7 @@ for n in range(count):
     with open("in.obj", "w") as f:
         for a, b in flat: f.write("v %.17g %.17g %.17g\n" % tuple(a * u[k] + b * v[k] for k in range(3)))
         f.write("f " + " ".join(str(i + 1) for i in range(len(flat))) + "\n")
-    subprocess.run(["root/usr/bin/assimp", "export", "in.obj", "out.obj", "-tri"], check=True, capture_output=True)
+    subprocess.run(["unpacked/usr/bin/assimp", "export", "in.obj", "out.obj", "-tri"], check=True, capture_output=True)
     loss = 1 - area(*read("out.obj")) / area(*read("in.obj"))
     lost, worst = lost + (loss > 0.01), max(worst, loss)
 print("%d polygons, %d lose area, at most %.1f %%" % (count, lost, 100 * worst))

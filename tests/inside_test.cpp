@@ -37,7 +37,7 @@ std::vector<Solid> solids() {
             {"two pieces", shapes::two_pieces()},
             {"nested", nested},
             {"far", shapes::moved(shapes::torus(1, 0.4f, 30, 12), {1e4f, -2e4f, 3e4f})},
-            {"tiny", shapes::moved(shapes::torus(1, 0.4f, 30, 12), {}, 1e-30f)},
+            {"tiny", shapes::moved(shapes::torus(1, 0.4f, 30, 12), {}, 1e-22f)},
             {"huge", shapes::moved(shapes::torus(1, 0.4f, 30, 12), {}, 1e15f)}};
 }
 

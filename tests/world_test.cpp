@@ -170,8 +170,8 @@ TEST(World, MissesNoPair) {
         }
         EXPECT_GT(needed, 20000u);
         EXPECT_LE(given, needed / 50 + needed * (slack == 0     ? 1
-                                   : slack < 0.1f ? 2
-                                                  : 6)); // without slack, nothing but what must be there
+                                                 : slack < 0.1f ? 2
+                                                                : 6)); // without slack, nothing but what must be there
     }
 }
 

@@ -76,8 +76,8 @@ struct Build {
 };
 
 /// Nodes are as thin as the solid, down to semi-axes of 1/16384 of the longest one, of 1e-5 of the diagonal of the
-/// mesh's box, and of 2^-21 of its largest coordinate, which is a few steps of a float: what is thinner is covered as if
-/// it were that thick.
+/// mesh's box, and of 2^-21 of its largest coordinate, which is a few steps of a float: what is thinner is covered as
+/// if it were that thick.
 inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kThinnestNodeOfPlace = 0x1p-21;
 
 /// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.

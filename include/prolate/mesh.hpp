@@ -69,8 +69,8 @@ inline constexpr float kDefaultWeld = -1;
 /// of the one that it was to be cut out of. Cavities, and bodies within bodies, stay as they are.
 ///
 /// Fails with bad_mesh for no triangle with an area, an index out of range, a coordinate that is not finite or beyond
-/// kLargestCoordinate (`what` begins with "triangle" or "vertex", and `where` is its index), or a mesh of less than 1e-24 m
-/// across; with out_of_memory. O(n log n). Thread-safe.
+/// kLargestCoordinate (`what` begins with "triangle" or "vertex", and `where` is its index), or a mesh of less than
+/// 1e-24 m across; with out_of_memory. O(n log n). Thread-safe.
 Result<CleanMesh> clean(MeshView mesh, float weld = kDefaultWeld);
 
 /// XXH3-64 of vertices, triangles and placement. Of a cleaned mesh, it is what BakeInfo::source_hash holds.
@@ -105,9 +105,9 @@ struct ImportReport {
 /// names it. Points and lines are left out. Axes stay as the file has them. A DAE's unit is noted and not applied; a
 /// 3MF's is. Of glTF, quantised positions and GPU instances are read; compressed geometry is refused by name.
 ///
-/// Fails with io (`where` is errno), out_of_memory, bad_file, or bad_mesh: that is a mesh so far from (0, 0, 0) that floats there are
-/// farther apart than 1e-5 of its diagonal (without `recentre`). What follows a "; " in Error::what is advice. The mesh
-/// is not cleaned yet. Thread-safe.
+/// Fails with io (`where` is errno), out_of_memory, bad_file, or bad_mesh: that is a mesh so far from (0, 0, 0) that
+/// floats there are farther apart than 1e-5 of its diagonal (without `recentre`). What follows a "; " in Error::what is
+/// advice. The mesh is not cleaned yet. Thread-safe.
 Result<Mesh> load_mesh(const char* path, const ImportOptions& options = {}, ImportReport* report = nullptr);
 
 /// A hash of all that load_mesh() makes the mesh of `path` from: the bytes of the file, its type, the options, the
