@@ -46,7 +46,10 @@ public:
           outside_volume_([this](const Fit& fit) {
               return solid_.outside ? solid_.outside(fit).volume : sampled_outside_volume(fit, solid_.field);
           }),
-          started_(Clock::now()) {}
+          started_(Clock::now()) {
+        for (uint32_t piece = 0; piece < pieces_.size(); ++piece)
+            pieces_.for_each_surface_point(piece, [this](const Vec& p) { surface_.push_back(p); });
+    }
 
     Grown run() {
         grow_root();
@@ -262,18 +265,11 @@ private:
     }
 
     void gather_points(const Task& task) {
-        size_t all = 0;
-        for (uint32_t piece = 0; piece < pieces_.size(); ++piece)
-            pieces_.for_each_surface_point(piece, [&](const Vec&) { ++all; });
         const double ellipsoids = static_cast<double>(task.children) * static_cast<double>(task.cells.size());
         const auto wanted = static_cast<size_t>(std::max(kLeastPoints, kPointsPerEllipsoid * ellipsoids));
-        const size_t stride = std::max<size_t>(1, all / wanted);
+        const size_t stride = std::max<size_t>(1, surface_.size() / wanted);
         points_.clear();
-        size_t at = 0;
-        for (uint32_t piece = 0; piece < pieces_.size(); ++piece)
-            pieces_.for_each_surface_point(piece, [&](const Vec& p) {
-                if (at++ % stride == 0) points_.push_back(p);
-            });
+        for (size_t at = 0; at < surface_.size(); at += stride) points_.push_back(surface_[at]);
     }
 
     void descend_set(EllipsoidSet& set, std::vector<uint32_t> owner, int iterations, double kappa, uint64_t seed,
@@ -366,12 +362,13 @@ private:
             Effort effort = options_.effort;
             effort.starts = 1, effort.cycles = 0;
             const Task task = task_below({0}, levels);
-            Approach free = approach(task, effort, step(most_nodes(levels)));
+            const Approach free = approach(task, effort, step(most_nodes(levels)));
             if (cancelled()) return;
             const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
             // The estimate does not see what is left uncovered of thin parts.
             if (thin(task.children) || !keep(estimate, free.set.fits.size())) {
-                const Solved solved = settle(task, std::move(free));
+                effort.starts = 2; // of either kind: for loose parts one may be several times as good as the other
+                const Solved solved = solve(task, effort, step(most_nodes(levels)));
                 if (cancelled()) return;
                 if (keep(solved.outside, solved.leaves.size())) {
                     follow_cuts(grown_.nodes, piece_count);
@@ -693,7 +690,8 @@ private:
     const double solid_volume_;
     const std::function<double(const Fit&)> outside_volume_; // E_vol
     Clock::time_point started_;
-    std::vector<Vec> points_; // of the surface, to be covered
+    std::vector<Vec> surface_; // points of it, as even as the pieces are before they are cut at seams
+    std::vector<Vec> points_;  // of these, what a descent looks at
 };
 
 } // namespace

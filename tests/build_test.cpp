@@ -729,7 +729,7 @@ TEST(Build, BeatsTheNaiveHierarchyOnRealMeshes) {
         const Build built = must_build(*mesh, options);
         for (size_t l = 0; l < 3; ++l) EXPECT_LE(built.levels[l + 1].outside_ratio, naive.ratio[l]) << naive.model;
         EXPECT_LE(built.tree.view().node_count(), 1u + 8 + 64 + 512);
-        EXPECT_LE(built.tree.bytes().size(), 1024 + kBlockBytes * (1u + 1 + 8 + 64));
+        EXPECT_LE(built.tree.bytes().size(), 1024 + kBlockBytes * (1u + 1 + 8 + 64 + 1 + 1 + 8)); // and bounding blocks
     }
 }
 
