@@ -25,6 +25,10 @@ uint64_t g_allocations = 0;
     if (void* p = std::malloc(size ? size : 1)) return p;
     throw std::bad_alloc();
 }
+[[gnu::noinline]] void* operator new(size_t size, const std::nothrow_t&) noexcept { // std::stable_sort's
+    ++g_allocations;
+    return std::malloc(size ? size : 1);
+}
 [[gnu::noinline]] void operator delete(void* p) noexcept {
     std::free(p);
 }
