@@ -35,7 +35,7 @@ void check(const Ellipsoid& e) {
 
 // Bytes that open() accepts may put a box anywhere.
 bool root_box_holds_center(const TreeView& tree) {
-    const std::byte* const block = tree.block(0);
+    const std::byte* const block = tree.bounding_block(0);
     for (size_t i = 0; i < 3; ++i) {
         const auto at = [&](size_t array) { return int64_t{load_le<uint8_t>(block + array + kBlockLanes * i)}; };
         const int64_t origin = load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
@@ -71,6 +71,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     tree.for_each_node([&](uint32_t n) {
         ++nodes;
         check(tree.ellipsoid(n));
+        check(tree.bound(n));
         const ChildRange children = tree.children(n);
         require(children.count == 0 || children.first > n);
         for (uint32_t i = 0; i < children.count; ++i) require(holds_node(children.first + i));
@@ -98,7 +99,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         const CollideResult ab = collide(tree, a, tree, b, context, options);
         const CollideResult ba = collide(tree, b, tree, a, context, options);
         require(ab.verdict == ba.verdict && ab.stats.pair_tests == ba.stats.pair_tests);
-        require(ab.stats.pair_tests <= options.max_pair_tests && ab.stats.deepest_level < tree.level_count());
+        require(ab.stats.tests() <= options.max_pair_tests && ab.stats.deepest_level < tree.level_count());
         require(holds_node(ab.pair.node_a) && holds_node(ab.pair.node_b));
         // A root never lies apart from itself, unless moved, or its box lies beside it. (Children may lie apart from
         // their parents here.)
