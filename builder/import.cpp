@@ -74,6 +74,27 @@ std::string words(const char* format, auto... values) {
     return out;
 }
 
+// What Assimp 5.2 does not notice: polygons with holes; indices that are not numbers, over which it runs on one place,
+// and takes more memory, for ever; and negative ones, which it takes for 0 (only those of weights may be negative).
+Result<void> check_collada(std::string_view text) {
+    if (text.find("<ph>") != text.npos)
+        return Error{ErrorCode::bad_file, "polygons with holes (<ph>), which are not read; export triangles"};
+    for (const std::string_view name : {"<p", "<v", "<vcount"})
+        for (size_t at = text.find(name); at != text.npos; at = text.find(name, at + 1)) {
+            const size_t end_of_name = at + name.size();
+            if (end_of_name == text.size() || std::string_view("> \t\r\n").find(text[end_of_name]) == text.npos)
+                continue; // a longer name
+            const size_t begin = text.find('>', end_of_name);
+            if (begin == text.npos) break;
+            if (text[begin - 1] == '/') continue; // <p/>
+            // To the end of the element: other markup inside is no list either.
+            const std::string_view list = text.substr(begin + 1, text.find("</", begin) - begin - 1);
+            const size_t bad = list.find_first_not_of(name == "<v" ? "-0123456789 \t\r\n" : "0123456789 \t\r\n");
+            if (bad != list.npos) return Error{ErrorCode::bad_file, "indices that are not numbers", begin + 1 + bad};
+        }
+    return {};
+}
+
 Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
     const std::string type = extension(path);
     constexpr std::string_view kTexts[] = {".obj", ".off", ".ply", ".stl"};
@@ -91,8 +112,8 @@ Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
     if (is_own) return read_text_or_binary(type, *bytes, detail);
     if (is_gltf) return read_gltf(type, *bytes, path, detail);
     if (type == ".3mf") return read_3mf(*bytes, detail);
-    if (type == ".dae" && bytes->find("<ph>") != bytes->npos)
-        return Error{ErrorCode::bad_file, "polygons with holes (<ph>), which are not read; export triangles"};
+    if (type == ".dae")
+        if (const auto fit = check_collada(*bytes); !fit) return fit.error();
     return read_with_assimp(type, path, detail);
 }
 

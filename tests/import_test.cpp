@@ -263,6 +263,22 @@ std::string dae(const std::string& nodes) {
 )";
 }
 
+// Assimp stays for ever at an index that is not a number, and takes memory.
+TEST_F(Import, DaeWithIndicesThatAreNoNumbersIsRefused) {
+    const std::string good = dae(R"(<node id="n"><instance_geometry url="#g"/></node>)");
+    const auto with = [&](const std::string& list) {
+        const std::string old = "<p>0 2 1 0 1 3 1 2 3 2 0 3</p>";
+        return write("p.dae", std::string(good).replace(good.find(old), old.size(), list));
+    };
+    expect_refused(with("<p>0 2 1 0 1 3 1 nan 3 2 0 3</p>"), ErrorCode::bad_file, "not numbers");
+    expect_refused(with("<p\n>0 2 1 0 1 3 1 2 3 2 0 3-</p>"), ErrorCode::bad_file, "not numbers");
+    expect_refused(with("<p>0 2 1 0 1 3 1.0 2 3 2 0 3</p>"), ErrorCode::bad_file, "not numbers");
+    expect_refused(with("<p>-1 2 1 0 1 3 1 2 3 2 0 3</p>"), ErrorCode::bad_file, "not numbers");
+    expect_refused(with("<p>0 2 1<![CDATA[nan]]></p>"), ErrorCode::bad_file, "not numbers");
+    expect_refused(with("<vcount>3 x</vcount><p>0 2 1 0 1 3 1 2 3 2 0 3</p>"), ErrorCode::bad_file, "not numbers");
+    expect_tetrahedron(with("<p>\n0 2 1\t0 1 3\r\n1 2 3 2 0 3 </p>"));
+}
+
 TEST_F(Import, DaeKeepsTheFilesUnitAndAxes) {
     expect_tetrahedron(write("plain.dae", dae(R"(<node id="n"><instance_geometry url="#g"/></node>)")));
 }
