@@ -15,7 +15,6 @@
 namespace prolate {
 namespace {
 
-constexpr double kFitTolerance = 2e-2; // merging ranks pairs; the result is refitted
 constexpr size_t kAllPairsLimit = 400; // pieces up to which components may pair up freely
 constexpr int kVolumeSamples = 192;    // of an ellipsoid, for its outside volume
 constexpr int kLloydRounds = 8;
@@ -129,7 +128,9 @@ private:
 
     double error(const Sketch& sketch) const {
         checkpoint();
-        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_, kFitTolerance));
+        // Pairs are ranked by differences of these: fits that stop early, 5 +- 2 % of volume above the least at a
+        // tolerance of 2e-2, would leave the order to where they start.
+        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_));
     }
 
     void offer(uint32_t a, uint32_t b) {
