@@ -15,6 +15,7 @@
 namespace prolate {
 namespace {
 
+constexpr double kFitTolerance = 2e-2; // merging ranks pairs; the result is refitted
 constexpr size_t kAllPairsLimit = 400; // pieces up to which components may pair up freely
 constexpr int kVolumeSamples = 192;    // of an ellipsoid, for its outside volume
 constexpr int kLloydRounds = 8;
@@ -128,9 +129,7 @@ private:
 
     double error(const Sketch& sketch) const {
         checkpoint();
-        // Pairs are ranked by differences of these: fits that stop early, 5 +- 2 % of volume above the least at a
-        // tolerance of 2e-2, would leave the order to where they start.
-        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_));
+        return outside_(enclosing_ellipsoid(sketch.points(), min_radius_, kFitTolerance));
     }
 
     void offer(uint32_t a, uint32_t b) {
