@@ -14,7 +14,6 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -214,10 +213,8 @@ private:
         const DistanceField field(mesh_, closed_, winding, std::min(field_resolution, kMaxFieldResolution));
         const Voxels cells = start_cells(winding);
         const Columns columns = measuring_columns(mesh_, closed_, winding, kMeterColumns);
-        const GrowOptions options{
-            options_,     effort_,
-            min_radius(), box_.size().norm(),
-            &cancelled_,  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
+        const GrowOptions options{options_, effort_, min_radius(), box_.size().norm(),
+                                  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
         const auto exact = [&winding, sign = winding_sign_](const Fit& fit) {
             EllipsoidVolume inside = inside_volume(fit, winding);
             inside.volume *= sign, inside.d_center *= sign, inside.d_shape *= sign;
@@ -361,7 +358,6 @@ private:
     Job job_;
     std::mutex reporting_;
     BuildProgress reached_{"clean", 0, 0};
-    std::atomic<bool> cancelled_ = false; // stays so: Cancelled ends all work
 
     MeshView mesh_;
     bool closed_ = false;

@@ -55,7 +55,6 @@ public:
     void run() {
         std::vector<Fit> next(fits_.size());
         for (int iteration = 0; iteration < options_.iterations; ++iteration) {
-            if (options_.cancelled->load(std::memory_order_relaxed)) return;
             checkpoint();
             const double t = static_cast<double>(iteration) / std::max(1, options_.iterations - 1);
             bool look = iteration % kNeighbourInterval == 0;

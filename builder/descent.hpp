@@ -24,7 +24,6 @@
 
 #include <prolate/tree.hpp>
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -63,7 +62,6 @@ struct DescentOptions {
     bool relocate;      ///< let ellipsoids that are of little use help where the error is worst
     double first_kappa; ///< 1 for a start from scratch; more to stay near the start
     uint64_t seed;
-    const std::atomic<bool>* cancelled;        ///< checked between iterations; then the result is to be thrown away
     std::function<void(double)> progress = {}; ///< called now and then with the share that is done
 };
 

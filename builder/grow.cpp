@@ -61,7 +61,7 @@ public:
             grow_upwards(meet_limits());
         else
             grow_levels(goal.levels ? goal.levels : 3);
-        if (!cancelled()) tidy();
+        tidy();
         return std::move(grown_);
     }
 
@@ -92,7 +92,6 @@ private:
         std::vector<std::vector<Fit>> chains; // see EllipsoidSet; empty if the one parent limits nothing
     };
 
-    bool cancelled() const { return options_.cancelled->load(std::memory_order_relaxed); }
     void report(double done) const {
         if (options_.progress) options_.progress(done, static_cast<uint32_t>(grown_.nodes.size()));
     }
@@ -143,7 +142,7 @@ private:
         Approach best;
         std::vector<uint32_t> best_owner;
         gather_points(task);
-        for (int start = 0; start < effort.starts && !cancelled(); ++start) {
+        for (int start = 0; start < effort.starts; ++start) {
             std::vector<uint32_t> owner;
             EllipsoidSet set = start_set(task, start, owner);
             descend_set(set, owner, effort.iterations, 1, start,
@@ -151,7 +150,7 @@ private:
             const double error = approximate_error(set);
             if (error < best.error || best.set.fits.empty()) best = {std::move(set), error}, best_owner.swap(owner);
         }
-        for (int cycle = 0; cycle < effort.cycles && !cancelled(); ++cycle) {
+        for (int cycle = 0; cycle < effort.cycles; ++cycle) {
             EllipsoidSet set = best.set;
             descend_set(set, best_owner, effort.iterations / 2, kReheat, effort.starts + cycle,
                         [&](double done) { progress(0.9 * (effort.starts + cycle + done) / rounds); });
@@ -162,7 +161,6 @@ private:
     }
 
     Solved settle(const Task& task, Approach approach) {
-        if (cancelled()) return {};
         EllipsoidSet& set = approach.set;
         refine_seams(pieces_, set);
         const std::vector<uint32_t> owner = polish_set(set);
@@ -283,7 +281,6 @@ private:
                                n > kFew,
                                kappa,
                                Random(options_.build.seed + seed).bits(),
-                               options_.cancelled,
                                progress};
         descend(set, solid_.field, points_, std::move(owner), options);
     }
@@ -296,8 +293,7 @@ private:
                                     options_.min_radius,
                                     solid_.outside,
                                     [this](std::span<const Fit> fits) { return outside_of(fits); },
-                                    options_.build.seed,
-                                    options_.cancelled};
+                                    options_.build.seed};
         return polish(set, pieces_, solid_.field, options);
     }
 
@@ -325,7 +321,7 @@ private:
             return [this, share, &done, &all](double part) { report((done + part * share) / all); };
         };
         bool limited = false; // the lowest level, by those above
-        for (uint32_t l = 1; l <= levels && !cancelled(); ++l) {
+        for (uint32_t l = 1; l <= levels; ++l) {
             const uint32_t piece_count = pieces_.size();
             const Task task = task_below(parents, l - level);
             Effort effort = options_.effort;
@@ -333,7 +329,6 @@ private:
                 effort.starts = std::max(1, effort.starts - 1);
             const Solved solved = solve(task, effort, step(most_nodes(l)));
             done += most_nodes(l);
-            if (cancelled()) return;
             if (solved.outside >= kLeastGain * outside) {
                 follow_cuts(grown_.nodes, piece_count);
                 continue;
@@ -363,13 +358,11 @@ private:
             effort.starts = 1, effort.cycles = 0;
             const Task task = task_below({0}, levels);
             const Approach free = approach(task, effort, step(most_nodes(levels)));
-            if (cancelled()) return;
             const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
             // The estimate does not see what is left uncovered of thin parts.
             if (thin(task.children) || !keep(estimate, free.set.fits.size())) {
                 effort.starts = 2; // of either kind: for loose parts one may be several times as good as the other
                 const Solved solved = solve(task, effort, step(most_nodes(levels)));
-                if (cancelled()) return;
                 if (keep(solved.outside, solved.leaves.size())) {
                     follow_cuts(grown_.nodes, piece_count);
                 } else {
@@ -489,7 +482,6 @@ private:
         task.children = count;
         task.cells = {all_cells()};
         std::vector<Leaf> leaves = solve(task, options_.effort, progress).leaves;
-        if (cancelled()) return {};
         halve(leaves, count, -HUGE_VAL); // the count is what was asked for
         if (leaves.size() < count) grown_.goal_reached = false;
         return leaves;
@@ -537,10 +529,9 @@ private:
         double low_excess = excess({&grown_.nodes[0].fit, 1});
         if (low_excess <= kMet) return {};
         std::vector<Leaf> best;
-        for (int round = 0; round < kRounds && !cancelled(); ++round) {
+        for (int round = 0; round < kRounds; ++round) {
             const uint32_t piece_count = pieces_.size();
             std::vector<Leaf> leaves = solve_flat(count, [&](double part) { report((round + part) / kRounds); });
-            if (cancelled()) return {};
             if (!best.empty()) follow_cuts(best, piece_count);
             const double now = excess(fits_of(leaves)), most = static_cast<double>(best.size()); // 0: unknown
             const bool met = now <= kMet;
@@ -567,7 +558,7 @@ private:
 
     // A tree over `leaves`, about as high as the degree needs.
     void grow_upwards(const std::vector<Leaf>& leaves) {
-        if (cancelled() || leaves.size() < 2) return;
+        if (leaves.size() < 2) return;
         std::vector<Group> root(1);
         root[0].members.resize(leaves.size());
         std::iota(root[0].members.begin(), root[0].members.end(), 0u);

@@ -44,8 +44,7 @@ struct GrowOptions {
     Effort effort;
     double min_radius; ///< metres
     double diagonal;   ///< of the mesh's box, metres
-    const std::atomic<bool>* cancelled;
-    /// Called now and then with the share of the work done and the number of nodes; may set `cancelled`.
+    /// Called now and then with the share of the work done and the number of nodes.
     std::function<void(double, uint32_t)> progress;
 };
 

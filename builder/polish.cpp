@@ -105,7 +105,6 @@ public:
         adopt_orphans();
         const int sweeps = std::max(1, options_.sweeps);
         for (int sweep = 0; sweep < sweeps; ++sweep) {
-            if (options_.cancelled->load(std::memory_order_relaxed)) return;
             if (sweep > 0 && sweep % kNeighbourInterval == 0) find_candidates();
             const double t = static_cast<double>(sweep) / std::max(1, sweeps - 1), left = 1 - kStepDecay * t;
             step_ = kFirstStep * left * left;

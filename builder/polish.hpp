@@ -24,7 +24,6 @@ struct PolishOptions {
     /// Hybrid error of a set that covers, by a finer measure than the steps follow: the best set seen is kept.
     std::function<double(std::span<const Fit>)> error;
     uint64_t seed;
-    const std::atomic<bool>* cancelled;
     std::function<void(double)> progress = {};
 };
 

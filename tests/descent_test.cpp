@@ -53,10 +53,8 @@ std::vector<uint32_t> nearest_of(std::span<const Fit> fits, std::span<const Vec>
     return out;
 }
 
-const std::atomic<bool> kNotCancelled = false;
-
 DescentOptions options_for(int iterations, Primitive primitive = Primitive::ellipsoid) {
-    return {{0.5, 0.5, 0.3}, primitive, iterations, 256, 1e-5, false, 1, 7, &kNotCancelled};
+    return {{0.5, 0.5, 0.3}, primitive, iterations, 256, 1e-5, false, 1, 7};
 }
 
 void descend_onto(const Mesh& mesh, EllipsoidSet& set, const DescentOptions& options) {
@@ -304,16 +302,6 @@ TEST(Descent, PointsWantAnEllipsoidThatMayHaveThem) {
         if (p.x() > 0.5) {
             EXPECT_LT(set.fits[1].radial_squared(p), 1.2) << p.transpose();
         }
-}
-
-TEST(Descent, StopsWhenCancelled) {
-    EllipsoidSet set = around_a_torus(4);
-    const std::vector<Fit> before = set.fits;
-    const std::atomic<bool> cancelled = true;
-    DescentOptions options = options_for(1000);
-    options.cancelled = &cancelled;
-    descend_onto(shapes::torus(1, 0.3f, 40, 20), set, options);
-    for (size_t i = 0; i < before.size(); ++i) EXPECT_EQ(set.fits[i].center, before[i].center);
 }
 
 } // namespace

@@ -19,7 +19,6 @@ namespace prolate {
 namespace {
 
 constexpr double kMinRadius = 1e-5;
-const std::atomic<bool> kNotCancelled = false;
 
 // A mesh and what is derived from it.
 struct Scene {
@@ -161,8 +160,7 @@ PolishOptions options_for(const Scene& scene, Primitive primitive, int sweeps = 
             kMinRadius,
             {},
             [&scene](std::span<const Fit> fits) { return scene.outside(fits); },
-            1,
-            &kNotCancelled};
+            1};
 }
 
 void expect_cover(const EllipsoidSet& set, const Pieces& pieces, const std::vector<uint32_t>& owner) {
