@@ -197,6 +197,7 @@ private:
         if (leaves.size() >= count) return;
         std::vector<double> outside;
         const auto look = [&](const Leaf& leaf) { return leaf.pieces.size() > 1 ? outside_volume_(leaf.fit) : -1; };
+        outside.reserve(leaves.size());
         for (const Leaf& leaf : leaves) outside.push_back(look(leaf));
         while (leaves.size() < count) {
             const auto most = static_cast<size_t>(std::ranges::max_element(outside) - outside.begin());
@@ -357,17 +358,17 @@ private:
             Effort effort = options_.effort;
             effort.starts = 1, effort.cycles = 0;
             const Task task = task_below({0}, levels);
-            const Approach free = approach(task, effort, step(most_nodes(levels)));
+            Approach free = approach(task, effort, step(most_nodes(levels)));
             const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
             // The estimate does not see what is left uncovered of thin parts.
             if (thin(task.children) || !keep(estimate, free.set.fits.size())) {
-                effort.starts = 2; // of either kind: for loose parts one may be several times as good as the other
-                const Solved solved = solve(task, effort, step(most_nodes(levels)));
-                if (keep(solved.outside, solved.leaves.size())) {
+                const Solved plain = settle(task, std::move(free));
+                if (keep(plain.outside, plain.leaves.size())) {
                     follow_cuts(grown_.nodes, piece_count);
                 } else {
+                    effort.starts = 2; // of either kind: for loose parts one may be several times as good as the other
                     grown_.nodes.resize(1);
-                    attach(solved, {0}, levels);
+                    attach(solve(task, effort, step(most_nodes(levels))), {0}, levels);
                     level = levels;
                 }
             }
@@ -659,6 +660,7 @@ private:
 
     static std::vector<std::vector<uint32_t>> singly(const std::vector<uint32_t>& leaves) {
         std::vector<std::vector<uint32_t>> out;
+        out.reserve(leaves.size());
         for (const uint32_t leaf : leaves) out.push_back({leaf});
         return out;
     }

@@ -13,7 +13,7 @@
 
 // Compiled in here, as Debian's README.Debian offers: the layout of its shared library's classes is not that of the
 // header (2.7.0+dfsg-2). Under a name of its own, so that a program may have another tinygltf.
-#define tinygltf prolate_tinygltf
+#define tinygltf prolate_tinygltf // NOLINT(readability-identifier-naming): the header's name
 #define TINYGLTF_IMPLEMENTATION
 #define TINYGLTF_NO_INCLUDE_JSON
 #define TINYGLTF_NO_EXTERNAL_IMAGE

@@ -58,7 +58,7 @@ void DistanceSearch::take(const TriangleDistance& found, const MeetingPair& pair
 bool DistanceSearch::decide(uint32_t node_a, uint32_t node_b, double bound) noexcept {
     const TriangleRange in_a = a.tree.triangles(node_a), in_b = b.tree.triangles(node_b);
     if (in_a.count == 0 && in_b.count == 0) return decide_ellipsoids(node_a, node_b, bound), true;
-    if (std::max(in_a.count, 1u) * std::max(in_b.count, 1u) > left()) return false;
+    if (uint64_t{std::max(in_a.count, 1u)} * std::max(in_b.count, 1u) > left()) return false;
     if (in_a.count > 0 && in_b.count > 0) return decide_triangles(node_a, node_b, in_a, in_b, bound), true;
     const bool triangles_in_a = in_a.count > 0;
     const TriangleRange range = triangles_in_a ? in_a : in_b;

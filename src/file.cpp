@@ -48,8 +48,8 @@ std::string resolved(const char* given) {
         char target[4096];
         const ssize_t length = ::readlink(path.c_str(), target, sizeof target);
         if (length <= 0 || length == static_cast<ssize_t>(sizeof target)) break; // no link
-        const std::string next(target, static_cast<size_t>(length));
-        path = next.starts_with('/') ? next : folder_of(path) + next;
+        const std::string_view next(target, static_cast<size_t>(length));
+        path = next.starts_with('/') ? std::string(next) : folder_of(path).append(next);
     }
     return path;
 }
