@@ -330,8 +330,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         const size_t level_bytes = level.block_count * kBlockBytes;
         const size_t begin = static_cast<size_t>(level.end_byte) - level_bytes;
         const auto hash = [&, count = bounding_blocks] {
-            return l > 0 ? hash_bytes(bytes.subspan(begin, level_bytes))
-                         : root_hash(bytes, level_count, count);
+            return l > 0 ? hash_bytes(bytes.subspan(begin, level_bytes)) : root_hash(bytes, level_count, count);
         };
         if (options.check_hash && hash() != load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
             return bad("the nodes of a level are damaged (hash mismatch)", begin);
