@@ -99,7 +99,7 @@ TEST(Build, EndsSoonWhenStoppedAtAnyStage) {
             EXPECT_EQ(built.error().code, ErrorCode::cancelled);
             EXPECT_LT(work_done() - stopped, kMostWork);
         }
-        EXPECT_GE(stages.size(), 4u);
+        EXPECT_GE(stages.size(), 3u); // a short one may pass between two questions
     }
 }
 
