@@ -46,7 +46,7 @@ public:
           outside_volume_([this](const Fit& fit) {
               return solid_.outside ? solid_.outside(fit).volume : sampled_outside_volume(fit, solid_.field);
           }),
-          started_(Clock::now()) {
+          started_(Clock::now()), seed_(options.build.seed) {
         for (uint32_t piece = 0; piece < pieces_.size(); ++piece)
             pieces_.for_each_surface_point(piece, [this](const Vec& p) { surface_.push_back(p); });
     }
@@ -235,7 +235,7 @@ private:
     EllipsoidSet start_set(const Task& task, int start, std::vector<uint32_t>& owner) const {
         const bool few = task.children <= kFew && task.cells.size() == 1;
         const bool merging = merges(task) && (start % 2 == 0) == few;
-        const auto seed = options_.build.seed + static_cast<uint64_t>(start);
+        const auto seed = seed_ + static_cast<uint64_t>(start);
         const uint32_t pieces_per_cluster =
             kPiecesPerCluster[static_cast<size_t>(start) / 2 % std::size(kPiecesPerCluster)];
         std::vector<std::vector<Cluster>> clusters(task.cells.size());
@@ -281,7 +281,7 @@ private:
                                options_.min_radius,
                                n > kFew,
                                kappa,
-                               Random(options_.build.seed + seed).bits(),
+                               Random(seed_ + seed).bits(),
                                progress};
         descend(set, solid_.field, points_, std::move(owner), options);
     }
@@ -294,7 +294,7 @@ private:
                                     options_.min_radius,
                                     solid_.outside,
                                     [this](std::span<const Fit> fits) { return outside_of(fits); },
-                                    options_.build.seed};
+                                    seed_};
         return polish(set, pieces_, solid_.field, options);
     }
 
@@ -310,71 +310,89 @@ private:
     // shell's eight children cannot do, their 64 children can, and a ball's cannot either. The levels left out are then
     // grown upwards between the two.
     void grow_levels(uint32_t levels) {
-        std::vector<uint32_t> parents{0};
         const double root_outside = outside_of({&grown_.nodes[0].fit, 1});
-        double outside = root_outside;
-        double settling = 1;
-        size_t count = 1;
-        uint32_t level = 0; // of the parents
-        double done = 0, all = most_nodes(levels);
-        for (uint32_t l = 1; l <= levels; ++l) all += most_nodes(l);
-        const auto step = [&](double share) {
-            return [this, share, &done, &all](double part) { report((done + part * share) / all); };
-        };
-        bool limited = false; // the lowest level, by those above
-        for (uint32_t l = 1; l <= levels; ++l) {
-            const uint32_t piece_count = pieces_.size();
-            const Task task = task_below(parents, l - level);
-            Effort effort = options_.effort;
-            if (l == levels && !task.chains.empty() && !merges(task)) // the set that nothing limits stands in for one
-                effort.starts = std::max(1, effort.starts - 1);
-            const Solved solved = solve(task, effort, step(most_nodes(l)));
-            done += most_nodes(l);
-            if (solved.outside >= kLeastGain * outside) {
-                follow_cuts(grown_.nodes, piece_count);
-                continue;
-            }
-            outside = solved.outside, settling = solved.settling, count = solved.leaves.size();
-            if (count == 1) { // the root itself, a little better
-                grown_.nodes[0].fit = solved.leaves[0].fit;
-                follow_cuts(grown_.nodes, piece_count);
-                continue;
-            }
-            limited = !task.chains.empty();
-            parents = attach(solved, parents, l - level);
-            level = l;
-            end_level(l);
-        }
-        if (level > 0 && (level < levels || limited)) {
+        work_ = most_nodes(levels);
+        for (uint32_t l = 1; l <= levels; ++l) work_ += most_nodes(l);
+        Levels grown = split_levels(levels, root_outside);
+        if (grown.level > 0 && (grown.level < levels || grown.limited)) {
             // Seams of the levels above are seams of the leaves: that costs some volume. Too much, or all that a level
-            // could have gained, and the tree is grown upwards from a set that nothing limits.
+            // could have gained, and other levels are tried; then the tree is grown upwards from a set that nothing
+            // limits.
             const auto keep = [&](double free_outside, size_t free_count) {
-                if (level < levels) return kLeastGain * outside <= free_outside;
+                if (grown.level < levels) return kLeastGain * grown.outside <= free_outside;
                 const double steepness = std::log(root_outside / free_outside) / std::log(free_count); // as errors fall
-                const double fewer = std::min(static_cast<double>(free_count) / static_cast<double>(count), kMostFewer);
-                return outside <= kMostLoss * free_outside * std::pow(fewer, std::clamp(steepness, 0.0, 1.0));
+                const double fewer =
+                    std::min(static_cast<double>(free_count) / static_cast<double>(grown.count), kMostFewer);
+                return grown.outside <= kMostLoss * free_outside * std::pow(fewer, std::clamp(steepness, 0.0, 1.0));
             };
             const uint32_t piece_count = pieces_.size();
             Effort effort = options_.effort;
             effort.starts = 1, effort.cycles = 0;
             const Task task = task_below({0}, levels);
             Approach free = approach(task, effort, step(most_nodes(levels)));
-            const double estimate = std::clamp(settling, 1.0, kMostSettling) * free.error;
+            const double estimate = std::clamp(grown.settling, 1.0, kMostSettling) * free.error;
             // The estimate does not see what is left uncovered of thin parts.
             if (thin(task.children) || !keep(estimate, free.set.fits.size())) {
                 const Solved plain = settle(task, std::move(free));
-                if (keep(plain.outside, plain.leaves.size())) {
-                    follow_cuts(grown_.nodes, piece_count);
-                } else {
+                const auto enough = [&] { return keep(plain.outside, plain.leaves.size()); };
+                follow_cuts(grown_.nodes, piece_count);
+                if (!enough() && grown.level == levels) {
+                    grown_.nodes.resize(1);
+                    ++seed_;
+                    grown = split_levels(levels, root_outside);
+                }
+                if (!enough()) {
                     effort.starts = 2; // of either kind: for loose parts one may be several times as good as the other
                     grown_.nodes.resize(1);
                     attach(solve(task, effort, step(most_nodes(levels))), {0}, levels);
-                    level = levels;
+                    grown.level = levels;
                 }
             }
-            end_level(level);
+            end_level(grown.level);
         }
-        grown_.goal_reached = level == levels;
+        grown_.goal_reached = grown.level == levels;
+    }
+
+    // Progress of `share` of the work.
+    std::function<void(double)> step(double share) const {
+        return [this, share](double part) { report(std::min(1.0, (done_ + part * share) / work_)); };
+    }
+
+    // What levels below the root came to.
+    struct Levels {
+        uint32_t level = 0;   // the lowest one
+        double outside;       // its volume
+        double settling = 1;  // Solved's
+        size_t count = 1;     // of its nodes
+        bool limited = false; // by nodes above it
+    };
+    Levels split_levels(uint32_t levels, double root_outside) {
+        Levels grown{.outside = root_outside};
+        std::vector<uint32_t> parents{0};
+        for (uint32_t l = 1; l <= levels; ++l) {
+            const uint32_t piece_count = pieces_.size();
+            const Task task = task_below(parents, l - grown.level);
+            Effort effort = options_.effort;
+            if (l == levels && !task.chains.empty() && !merges(task)) // the set that nothing limits stands in for one
+                effort.starts = std::max(1, effort.starts - 1);
+            const Solved solved = solve(task, effort, step(most_nodes(l)));
+            done_ += most_nodes(l);
+            if (solved.outside >= kLeastGain * grown.outside) {
+                follow_cuts(grown_.nodes, piece_count);
+                continue;
+            }
+            grown.outside = solved.outside, grown.settling = solved.settling, grown.count = solved.leaves.size();
+            if (grown.count == 1) { // the root itself, a little better
+                grown_.nodes[0].fit = solved.leaves[0].fit;
+                follow_cuts(grown_.nodes, piece_count);
+                continue;
+            }
+            grown.limited = !task.chains.empty();
+            parents = attach(solved, parents, l - grown.level);
+            grown.level = l;
+            end_level(l);
+        }
+        return grown;
     }
 
     // Of a level, by the degree.
@@ -683,8 +701,10 @@ private:
     const double solid_volume_;
     const std::function<double(const Fit&)> outside_volume_; // E_vol
     Clock::time_point started_;
-    std::vector<Vec> surface_; // points of it, as even as the pieces are before they are cut at seams
-    std::vector<Vec> points_;  // of these, what a descent looks at
+    uint64_t seed_;              // of the sets
+    double work_ = 1, done_ = 0; // of a tree of levels, in nodes
+    std::vector<Vec> surface_;   // points of it, as even as the pieces are before they are cut at seams
+    std::vector<Vec> points_;    // of these, what a descent looks at
 };
 
 } // namespace
