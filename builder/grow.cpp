@@ -117,8 +117,7 @@ private:
 
     void grow_root() {
         GrownNode root;
-        root.pieces.resize(pieces_.size());
-        std::iota(root.pieces.begin(), root.pieces.end(), 0u);
+        own_all(root);
         root.fit = fit_pieces(pieces_, root.pieces, options_.min_radius);
         if (options_.build.primitive == Primitive::sphere) {
             EllipsoidSet one{{as_primitive(root.fit, Primitive::sphere)}, {}, {}};
@@ -337,13 +336,13 @@ private:
                 const auto enough = [&] { return keep(plain.outside, plain.leaves.size()); };
                 follow_cuts(grown_.nodes, piece_count);
                 if (!enough() && grown.level == levels) {
-                    grown_.nodes.resize(1);
+                    start_over();
                     ++seed_;
                     grown = split_levels(levels, root_outside);
                 }
                 if (!enough()) {
                     effort.starts = 2; // of either kind: for loose parts one may be several times as good as the other
-                    grown_.nodes.resize(1);
+                    start_over();
                     attach(solve(task, effort, step(most_nodes(levels))), {0}, levels);
                     grown.level = levels;
                 }
@@ -351,6 +350,17 @@ private:
             end_level(grown.level);
         }
         grown_.goal_reached = grown.level == levels;
+    }
+
+    // The root alone, with all pieces as they are cut by now.
+    void start_over() {
+        grown_.nodes.resize(1);
+        grown_.nodes[0].first_child = grown_.nodes[0].child_count = 0;
+        own_all(grown_.nodes[0]);
+    }
+    void own_all(GrownNode& root) const {
+        root.pieces.resize(pieces_.size());
+        std::iota(root.pieces.begin(), root.pieces.end(), 0u);
     }
 
     // Progress of `share` of the work.
@@ -470,8 +480,7 @@ private:
     void tidy() {
         std::vector<GrownNode>& nodes = grown_.nodes;
         if (nodes.size() == 1) {
-            nodes[0].pieces.resize(pieces_.size());
-            std::iota(nodes[0].pieces.begin(), nodes[0].pieces.end(), 0u);
+            own_all(nodes[0]);
             return;
         }
         for (uint32_t n = static_cast<uint32_t>(nodes.size()); n-- > 1;) // children come after their parents
