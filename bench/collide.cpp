@@ -5,7 +5,7 @@
 // learn one pose; 4096 pairs are 1 MB, 256 tree poses one pair of trees.
 //
 //   bench_collide --benchmark_repetitions=5 --benchmark_report_aggregates_only
-#include "query/separation.hpp"
+#include "query/ellipsoid/separation.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 

@@ -4,9 +4,9 @@
 // they cross. Counters: `pairs` tested a call, `exact` those that took the scalar test, `answers` a hash of the
 // answers. Time is for a call; `time_a_pair` divides by the pairs. 1024 scenes are visited in turn, so that the branch
 // predictor cannot learn them.
-#include "query/triangle_contact.hpp"
-#include "query/triangle_distance.hpp"
-#include "query/triangle_lanes.hpp"
+#include "query/triangle/contact.hpp"
+#include "query/triangle/distance.hpp"
+#include "query/triangle/leaves.hpp"
 #include "tests/scenes.hpp"
 #include "tests/triangle_pairs.hpp"
 

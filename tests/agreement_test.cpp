@@ -1,12 +1,12 @@
 // What a body is, all queries say alike: a tree without triangles is the union of its leaf ellipsoids, an exact tree
 // its triangles and what they enclose. Verdicts are compared to the bit, with each other and with all pairs of leaves
 // or triangles, at poses near contact; and with every budget, bounds only tighten.
-#include "query/gap.hpp"
-#include "query/order.hpp"
-#include "query/ray.hpp"
-#include "query/rounded_box.hpp"
-#include "query/triangle.hpp"
-#include "query/triangle_ellipsoid.hpp"
+#include "query/ellipsoid/gap.hpp"
+#include "query/node/order.hpp"
+#include "query/raycast/ray.hpp"
+#include "query/shapes/rounded_box.hpp"
+#include "query/triangle/ellipsoid.hpp"
+#include "query/triangle/triangle.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"

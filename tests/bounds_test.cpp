@@ -1,6 +1,6 @@
 // Boxes around placed trees: they hold what they must, whatever the pose, and are hardly larger than that.
-#include "query/bounds.hpp"
-#include "query/bounds_tree.hpp"
+#include "query/world/bounds.hpp"
+#include "query/world/bounds_tree.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

@@ -1,5 +1,5 @@
 // The dynamic tree of boxes: its invariants, and what walks find against all boxes in a row.
-#include "query/bounds_tree.hpp"
+#include "query/world/bounds_tree.hpp"
 #include "tests/scenes.hpp"
 
 #include <gtest/gtest.h>

@@ -135,7 +135,8 @@ TEST(Collide, TheCheckAboveNoticesTreesThatDoNotCover) {
     EXPECT_GT(false_separations(zoo(0.7), 5), 0u);
 }
 
-// The descent as query/collide.cpp's header words it, recursive and in the opposite order, on single-pair tests.
+// The descent as query/collide/collide.cpp's header words it, recursive and in the opposite order, on single-pair
+// tests.
 class BruteForce {
 public:
     BruteForce(const Scene& a, const Scene& b, const Query& q, uint32_t max_level)

@@ -1,6 +1,6 @@
 // Contact manifolds: boxes, balls and heaps with known contacts, and what holds for all bodies.
-#include "query/gap.hpp"
-#include "query/separation.hpp"
+#include "query/ellipsoid/gap.hpp"
+#include "query/ellipsoid/separation.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

@@ -2,13 +2,13 @@
 // those of a twin in plain C++.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/distance_lanes_test.cpp"
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
 #include <hwy/foreach_target.h>
 
-#include "query/distance_lanes-inl.hpp"
+#include "query/node/distance_lanes-inl.hpp"
 
-#include "query/gap.hpp"
+#include "query/ellipsoid/gap.hpp"
 #include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "tests/reference.hpp"

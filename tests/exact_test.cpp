@@ -1,6 +1,6 @@
 // Exact trees: every triangle in its place, the proof, and queries against brute force over all pairs of triangles.
 #include "builder/random.hpp"
-#include "query/triangle.hpp"
+#include "query/triangle/triangle.hpp"
 #include "src/block.hpp"
 #include "src/bytes.hpp"
 #include "src/format.hpp"

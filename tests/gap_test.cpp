@@ -3,7 +3,7 @@
 // The gap along any normal is a lower bound of the signed distance, the distance of any two points of the bodies an
 // upper one: so a normal and two points prove themselves, and no second optimiser is needed for bodies that are apart.
 // The depth of bodies that overlap is compared with the best of many directions.
-#include "query/gap.hpp"
+#include "query/ellipsoid/gap.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 

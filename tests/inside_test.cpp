@@ -1,6 +1,6 @@
 // Points in solids: winding numbers through the tree against all triangles, in every direction and on every target.
-#include "query/crossing.hpp"
-#include "query/inside.hpp"
+#include "query/inside/crossing.hpp"
+#include "query/inside/inside.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

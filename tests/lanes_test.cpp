@@ -2,11 +2,11 @@
 // target as its scalar twin.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/lanes_test.cpp"
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
 #include <hwy/foreach_target.h>
 
-#include "query/hull_lanes-inl.hpp"
+#include "query/node/hull_lanes-inl.hpp"
 
 #include "src/bytes.hpp"
 #include "tests/hunt.hpp"

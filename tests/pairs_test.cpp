@@ -1,7 +1,7 @@
 // Batches of pairs, and single ones: a hunt for wrong answers near contact, and what else the header promises.
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
-#include "query/gap.hpp"
+#include "query/ellipsoid/gap.hpp"
 #include "tests/hunt.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

@@ -2,11 +2,11 @@
 // twins.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/ray_lanes_test.cpp"
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
 #include <hwy/foreach_target.h>
 
-#include "query/ray_lanes-inl.hpp"
+#include "query/raycast/lanes-inl.hpp"
 
 #include "tests/blocks.hpp"
 #include "tests/reference.hpp"

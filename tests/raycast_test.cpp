@@ -1,5 +1,5 @@
 // Rays against leaves, in long double; rays against trees, against all their leaves; on every target.
-#include "query/ray.hpp"
+#include "query/raycast/ray.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

@@ -1,4 +1,5 @@
-// Slow truth about two ellipsoids, in long double, by two methods that share nothing with query/separation.cpp.
+// Slow truth about two ellipsoids, in long double, by two methods that share nothing with
+// query/ellipsoid/separation.cpp.
 //
 //  1. contact(): maximises Perram and Wertheim's f(lambda) = lambda (1 - lambda) r^T Q(lambda)^-1 r by golden section
 //     over log(lambda / (1 - lambda)), with a plain inverse. sqrt(f) is the factor by which both bodies must be scaled

@@ -3,7 +3,7 @@
 // What must hold for every pair: `separated` only if the reference says apart, certified `overlapping` only if it says
 // overlapping, and a decision in favour of separation wherever the gap is above kDecided. The same harness is run on
 // deliberately wrong tests and must catch them.
-#include "query/separation.hpp"
+#include "query/ellipsoid/separation.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 

@@ -1,13 +1,13 @@
 // Shapes against leaves, placed to touch or nearly so; against the lanes of blocks; against trees and all their leaves.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/shapes_test.cpp"
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
 #include <hwy/foreach_target.h>
 
-#include "query/shape_lanes-inl.hpp"
+#include "query/shapes/lanes-inl.hpp"
 
-#include "query/inside.hpp"
+#include "query/inside/inside.hpp"
 #include "tests/blocks.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"

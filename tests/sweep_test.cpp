@@ -1,6 +1,6 @@
 // Bodies in motion: what sweep() promises, against positions in long double at many times.
-#include "query/motion.hpp"
-#include "query/sweep_search.hpp"
+#include "query/sweep/motion.hpp"
+#include "query/sweep/search.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

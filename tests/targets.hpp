@@ -1,7 +1,7 @@
 // Runs a check once for every instruction set that this machine has and the library was compiled for.
 #pragma once
 
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
 #include <hwy/highway.h>
 #include <hwy/targets.h>

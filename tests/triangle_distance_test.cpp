@@ -1,6 +1,6 @@
 // Distance and contact of two triangles against long double.
-#include "query/triangle_contact.hpp"
-#include "query/triangle_distance.hpp"
+#include "query/triangle/contact.hpp"
+#include "query/triangle/distance.hpp"
 #include "tests/triangle_pairs.hpp"
 
 #include <gtest/gtest.h>

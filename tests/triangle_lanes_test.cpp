@@ -1,8 +1,8 @@
 // The float kernels for triangles of two leaves: against long double, against the scalar test, and against themselves
 // on every instruction set.
-#include "query/targets.hpp"
+#include "query/simd/targets.hpp"
 
-#include "query/triangle_lanes.hpp"
+#include "query/triangle/leaves.hpp"
 #include "tests/triangle_pairs.hpp"
 
 #include <hwy/highway.h>

@@ -1,7 +1,7 @@
 // Triangle tests and the point-in-solid test of the query: against exact integers, and against long double.
-#include "query/inside.hpp"
-#include "query/triangle.hpp"
-#include "query/triangle_lanes.hpp"
+#include "query/inside/inside.hpp"
+#include "query/triangle/leaves.hpp"
+#include "query/triangle/triangle.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"

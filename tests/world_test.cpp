@@ -1,5 +1,5 @@
 // Worlds: no pair is missed, lists do not depend on threads, and everything refuses what it should.
-#include "query/bounds.hpp"
+#include "query/world/bounds.hpp"
 #include "tests/scenes.hpp"
 #include "tests/threads.hpp"
 

@@ -39,7 +39,7 @@ struct PairCache {
 
 /// Do `a` at `pose_a` and `b` at `pose_b` meet, or come as near as options.margin? Stops at the first pair of leaves,
 /// or of their triangles, that do. Symmetric: swapping the bodies gives the same verdict. Thread-safe on shared trees.
-/// Perram and Wertheim 1985 (query/separation.hpp); the descent is told in query/collide.cpp.
+/// Perram and Wertheim 1985 (query/ellipsoid/separation.hpp); the descent is told in query/collide/collide.cpp.
 CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                       QueryContext& context, const QueryOptions& options = {}, PairCache* cache = nullptr) noexcept;
 

@@ -78,8 +78,8 @@ struct ContactResult {
 ///     area with it; points of the last query before others.
 /// With max_level or a prefix, nodes stand for what is in them. What meets is gone through twice, and counted once.
 ///
-/// Gregorius, "Robust contact creation for physics simulations" (GDC 2015), for 4; query/triangle_contact.hpp for the
-/// normals, query/contacts.cpp for the rest.
+/// Gregorius, "Robust contact creation for physics simulations" (GDC 2015), for 4; query/triangle/contact.hpp for the
+/// normals, query/contacts/contacts.cpp for the rest.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options = {}) noexcept;
 

@@ -67,7 +67,7 @@ struct DistanceResult {
 /// a part of the other is settled first, where it may. A pose that is not finite, or whose quaternion is zero, leaves
 /// everything open: undecided, 0 <= distance <= infinity.
 ///
-/// Branch and bound over pairs of nodes; Johnson and Cohen 1998, and query/distance.cpp.
+/// Branch and bound over pairs of nodes; Johnson and Cohen 1998, and query/distance/distance.cpp.
 DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                         QueryContext& context, const DistanceOptions& options = {},
                         DistanceCache* cache = nullptr) noexcept;

@@ -52,7 +52,7 @@ struct RaycastResult {
 /// meets that flies along it. A ray that begins so near, or inside a leaf ellipsoid, hits it at t = 0. Nodes at
 /// options.max_level count as the ellipsoids that hold all below them. Every margin has an answer (query.hpp): with an
 /// infinite one or NaN, all rays hit at t = 0. Nodes are visited nearest first, and not at all beyond the best hit.
-/// Thread-safe on shared trees. The descent is told in query/raycast.cpp, the tests in query/ray.hpp.
+/// Thread-safe on shared trees. The descent is told in query/raycast/raycast.cpp, the tests in query/raycast/ray.hpp.
 RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
                       const QueryOptions& options = {}) noexcept;
 

@@ -45,7 +45,8 @@ struct OverlapResult {
 };
 
 /// Do the tree at `pose` and the shape meet, or come as near as options.margin? Stops at the first leaf, or triangle,
-/// that does. Thread-safe on shared trees. The descent is told in query/shapes.cpp, the tests in query/rounded_box.hpp.
+/// that does. Thread-safe on shared trees. The descent is told in query/shapes/shapes.cpp, the tests in
+/// query/shapes/rounded_box.hpp.
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, QueryContext& context,
                       const QueryOptions& options = {}) noexcept;
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, QueryContext& context,

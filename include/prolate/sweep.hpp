@@ -80,7 +80,7 @@ struct SweepResult {
 /// undecided, time_lower = 0.
 ///
 /// Conservative advancement of pairs of nodes, each at its own pace, the earliest first: Mirtich 1996, Zhang et al.
-/// 2007, and query/sweep.cpp.
+/// 2007, and query/sweep/sweep.cpp.
 SweepResult sweep(const TreeView& a, const Motion& motion_a, const TreeView& b, const Motion& motion_b,
                   QueryContext& context, const SweepOptions& options = {}) noexcept;
 

@@ -1,10 +1,10 @@
 // A world of many bodies: which of them may touch, and do they; and one pair of bodies at many poses.
 //
 // A World is a broadphase, in the way of Box2D's and Bullet's: each body has a box, somewhat larger than it need be, so
-// that small moves change nothing, and a dynamic tree of these boxes (query/bounds_tree.hpp has the sources) finds
-// those that overlap. What it promises: two bodies whose solids come nearer than their margins together are a pair.
-// Rounding is outward throughout. A body whose pose is not finite, or whose box is beyond the range of floats, never
-// separates: it is a pair with every other body that the filter admits.
+// that small moves change nothing, and a dynamic tree of these boxes (query/world/bounds_tree.hpp has the sources)
+// finds those that overlap. What it promises: two bodies whose solids come nearer than their margins together are a
+// pair. Rounding is outward throughout. A body whose pose is not finite, or whose box is beyond the range of floats,
+// never separates: it is a pair with every other body that the filter admits.
 //
 // Memory comes from one std::pmr::memory_resource, given at the start. Only create(), reserve(), insert() and
 // update_pairs() take any, and the last two none as long as what was reserved suffices. If it refuses, they fail with

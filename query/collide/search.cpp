@@ -1,0 +1,276 @@
+// Tree against tree: simultaneous descent, a block of eight children at a time.
+//
+// Of a pair of nodes that meet, the larger is opened: its children, up to eight of them in a block, are tested at once
+// against the other (lanes-inl.hpp), and those that are not separated from it make new pairs. Of exact trees, those
+// that nearly were are looked at more closely along the direction that nearly parted them: hulls of what is below the
+// nodes (hull_lanes-inl.hpp), or the triangles of two leaves (corners.hpp). Two leaves are decided at once, in double
+// precision (leaves.cpp). Which node is opened depends on the pair alone, so max_level and budgets only cut the descent
+// off: if level l says separated, so does every deeper one.
+//
+// Sound because a node's bounding volume holds all leaves below it: if B is apart from A's child i, no leaf under B
+// meets one under that child.
+//
+// Depth first, and of the children that meet, that with the deepest overlap first: bodies that touch are found out
+// soon, and for bodies that do not the order makes no difference.
+//
+// Complexity: one block test for each pair of nodes that meet, unless both are leaves.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/collide/search.cpp"
+#include "query/simd/targets.hpp" // before foreach_target.h
+
+#include <hwy/foreach_target.h>
+
+#include "query/collide/search.hpp"
+#include "query/node/hull_lanes-inl.hpp"
+#include "query/triangle/leaves-inl.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
+namespace {
+
+// QueryContext::Entry::flags: which of the two nodes is to be opened, and whether the other is a leaf.
+constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2;
+
+// Nodes whose n.r / (a + b) is greater may well be apart along n as their hulls, or triangles, see it: below, a closer
+// look costs more than it saves.
+constexpr float kNearlyParted = 0.88f, kLeavesNearlyParted = 0.75f;
+
+template <bool kMargin> class Search {
+public:
+    explicit Search(Descent& descent)
+        : d_(descent),
+          stack_(descent.stack), sides_{{descent.a, descent.lattice_b_to_a}, {descent.b, descent.lattice_a_to_b}} {}
+
+    Verdict run() {
+        const Verdict verdict = search();
+        d_.stats.pair_tests = pair_tests_, d_.stats.block_tests = block_tests_;
+        d_.a.deepest = sides_[0].deepest, d_.b.deepest = sides_[1].deepest;
+        return verdict;
+    }
+
+private:
+    // Nodes that were placed before: every third or so is tested against another block soon.
+    static constexpr uint32_t kPlaced = 8;
+    struct Placed {
+        uint32_t node = UINT32_MAX;
+        Single single;
+    };
+    // One of the bodies, as that whose children are tested.
+    struct Side {
+        Side(const TreeSide& body, const LatticePose& other_to_here)
+            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)),
+              hulls(body.tree.has_triangles() ? body.tree.hull(0) : nullptr), step_exponent(body.lattice.step_exponent),
+              leaves_from(body.leaves_from), limit_from(body.limit_from), pose(other_to_here),
+              per_step(power_of_two(-step_exponent)) {}
+        // As queries take it: bounding blocks above the last level.
+        const std::byte* block(uint32_t slot) const {
+            return (slot < leaves_from ? bounding_blocks : blocks) + size_t{slot / kBlockLanes} * kBlockBytes;
+        }
+
+        const std::byte *blocks, *bounding_blocks;
+        const std::byte* hulls;
+        int32_t step_exponent;
+        uint32_t leaves_from, limit_from, deepest = 0;
+        const LatticePose& pose;
+        double per_step;
+        Placed placed[kPlaced]; // of the other body's nodes
+    };
+
+    Verdict search() {
+        // The roots, as if B's were the only child of a node that meets everything.
+        if (budget() < 1) return Verdict::undecided;
+        pair_tests_ = 1;
+        if (test_all(kOpenB, 0, 1, 0, d_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
+        while (size_ > 0) {
+            const auto e = stack_[--size_];
+            const uint32_t open = e.flags & kOpenB;
+            const uint32_t node = open != 0 ? e.node_b : e.node_a, other = open != 0 ? e.node_a : e.node_b;
+            const Side& side = sides_[open];
+            if (node >= side.limit_from) { // max_level ends the descent
+                if (d_.take({e.node_a, e.node_b, kNoTriangle, kNoTriangle})) return Verdict::overlapping;
+                continue;
+            }
+            const std::byte* const block = side.block(node);
+            const uint32_t lane = node % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
+            const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
+            if (count > budget()) return Verdict::undecided;
+            pair_tests_ += count; // also those that it may not come to
+            if (count <= kBlockLanes ? test(open, first, count, other, e.flags & kOtherIsLeaf)
+                                     : test_all(open, first, count, other, e.flags & kOtherIsLeaf))
+                return stopped();
+        }
+        return Verdict::separated;
+    }
+
+    // What is known of the lanes that were not parted.
+    struct Kept {
+        alignas(64) float depth[kBlockLanes];                             // p / (a + b)
+        alignas(64) float x[kBlockLanes], y[kBlockLanes], z[kBlockLanes]; // n
+        alignas(64) float gap[kBlockLanes];                               // beyond the margins
+        alignas(64) float a[kBlockLanes], b[kBlockLanes];
+        alignas(64) float in_a[3][kBlockLanes], in_b[3][kBlockLanes]; // L1^T n, L2^T n
+        HWY_INLINE void keep(const LaneTerms& t, Lanes margin, size_t i) {
+            const LaneTag d;
+            hn::Store(hn::Div(t.p, t.sum), d, depth + i);
+            hn::Store(t.x, d, x + i), hn::Store(t.y, d, y + i), hn::Store(t.z, d, z + i);
+            hn::Store(t.a, d, a + i), hn::Store(t.b, d, b + i);
+            hn::Store(t.in_a.x, d, in_a[0] + i), hn::Store(t.in_a.y, d, in_a[1] + i),
+                hn::Store(t.in_a.z, d, in_a[2] + i);
+            hn::Store(t.in_b.x, d, in_b[0] + i), hn::Store(t.in_b.y, d, in_b[1] + i),
+                hn::Store(t.in_b.z, d, in_b[2] + i);
+            Lanes beyond = t.gap;
+            if constexpr (kMargin) beyond = hn::Sub(beyond, hn::Mul(margin, length({t.x, t.y, t.z})));
+            const auto fit = hn::Gt(t.length, hn::Set(d, kLaneDirection));
+            hn::Store(hn::IfThenElse(fit, beyond, hn::Set(d, -HUGE_VALF)), d, gap + i);
+        }
+    };
+
+    // Do the hulls of a lane's node and the other tree's leave a gap along n?
+    HWY_NOINLINE bool hulls_part(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
+        const auto reach = [](const Side& side, uint32_t slot, float x, float y, float z, float width) {
+            const std::byte* const block = side.block(slot);
+            const uint32_t at = slot % kBlockLanes;
+            if (side.hulls == nullptr || load_le<uint8_t>(block + kBlockCount + at) >= kTriangleLeaf) return width;
+            return hull_reach_here(hull_of(side.hulls, block, at), x, y, z, width);
+        };
+        const float a = kept.a[lane], b = kept.b[lane];
+        const float reach_a =
+            reach(sides_[open ^ kOpenB], other, kept.in_a[0][lane], kept.in_a[1][lane], kept.in_a[2][lane], a);
+        const float reach_b =
+            reach(sides_[open], node, -kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
+        return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
+    }
+
+    Verdict stopped() const { return d_.out_of_tests ? Verdict::undecided : Verdict::overlapping; }
+
+    uint64_t budget() const { // d_.stats has the triangles' tests, and the nodes' later
+        const uint64_t left = d_.left();
+        return left - std::min(left, pair_tests_ - d_.stats.pair_tests);
+    }
+
+    // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
+    // the other pairs that do, the deepest last. True to stop the query.
+    HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
+        const LaneTag d;
+        Side& side = sides_[open];
+        const std::byte* const block = side.block(first);
+        ++block_tests_;
+        side.deepest = std::max(side.deepest, first + count - 1);
+        Placed& placed = side.placed[other % kPlaced];
+        if (placed.node != other) {
+            placed.single = place_here(sides_[open ^ kOpenB].block(other), other % kBlockLanes, side.pose);
+            placed.node = other;
+        }
+        const Single& single = placed.single;
+        const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
+        uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
+        if (meet == 0) return false;
+        uint32_t met = 0, larger = 0;
+        Kept kept;
+        const Lanes margin = hn::Set(d, lattice_margin);
+        for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+            const LaneTerms t = evaluate(load_nodes(block, i, side.step_exponent), single);
+            met |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
+            larger |= bits_of(hn::Gt(t.size, hn::Set(d, single.size)), i);
+            kept.keep(t, margin, i);
+        }
+        meet &= met;
+        if (meet == 0) return false;
+        d_.roots_meet = true;
+        const uint32_t leaves = first >= side.leaves_from ? 0xff : leaf_lanes(block);
+        if (other_is_leaf != 0 && (meet & leaves) != 0) {
+            if (decide(open, first, meet & leaves, other, kept)) return true;
+            meet &= ~leaves;
+        }
+        const uint32_t opened = ~leaves & (other_is_leaf != 0 ? 0xff : larger);
+        const uint32_t if_opened = open | other_is_leaf, if_other_opened = open ^ kOpenB;
+        uint32_t deepest = size_;
+        float least = HUGE_VALF;
+        for (; meet != 0; meet &= meet - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
+            const uint32_t node = first + lane;
+            if (have_hulls_ && kept.depth[lane] > kNearlyParted && hulls_part(open, node, other, kept, lane)) continue;
+            const uint32_t flags =
+                (opened >> lane & 1) != 0 ? if_opened : if_other_opened | (leaves >> lane & 1) * kOtherIsLeaf;
+            if (kept.depth[lane] < least) least = kept.depth[lane], deepest = size_;
+            stack_[size_++] = {open != 0 ? other : node, open != 0 ? node : other, kept.depth[lane], flags};
+        }
+        if (deepest < size_) std::swap(stack_[deepest], stack_[size_ - 1]);
+        return false;
+    }
+
+    // Decides on these lanes, the deepest first, against the other tree's leaf. True to stop the query.
+    HWY_NOINLINE bool decide(uint32_t open, uint32_t first, uint32_t lanes, uint32_t other, const Kept& kept) {
+        d_.stats.pair_tests = pair_tests_;
+        while (lanes != 0) {
+            auto lane = static_cast<uint32_t>(std::countr_zero(lanes));
+            for (uint32_t rest = lanes & (lanes - 1); rest != 0; rest &= rest - 1) {
+                const auto next = static_cast<uint32_t>(std::countr_zero(rest));
+                if (kept.depth[next] < kept.depth[lane]) lane = next;
+            }
+            lanes &= ~(1u << lane);
+            const bool look = kept.depth[lane] > kLeavesNearlyParted;
+            const glm::dvec3 to_lane =
+                look ? glm::dvec3(kept.x[lane], kept.y[lane], kept.z[lane]) : glm::dvec3(0); // in its frame
+            if (open != 0 ? d_.meet(other, first + lane, d_.b_to_a.rotation * to_lane)
+                          : d_.meet(first + lane, other, -to_lane))
+                return true;
+        }
+        return false;
+    }
+
+    // Some or all children, where that is rare: in a loop with the usual case this would cost it registers.
+    HWY_NOINLINE bool test_all(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
+        for (uint32_t i = 0; i < count; i += kBlockLanes)
+            if (test(open, first + i, std::min(count - i, kBlockLanes), other, other_is_leaf)) return true;
+        return false;
+    }
+
+    // Bit i: lane i, if there is such a node, has no children: its count is 0, or one of triangles.
+    static uint32_t leaf_lanes(const std::byte* block) {
+        static_assert(kTriangleLeaf == 0x80);
+        constexpr uint64_t kTop = 0x8080808080808080;
+        const auto counts = load_le<uint64_t>(block + kBlockCount);
+        const uint64_t some = (counts & ~kTop) + ~kTop; // top bit of a byte: its lower bits are not all zero
+        const uint64_t leaves = (counts | ~some) & kTop;
+        return static_cast<uint32_t>((leaves >> 7) * 0x0102040810204080 >> 56); // gathers one bit of each byte
+    }
+
+    // options.margin + skin in lattice steps, rounded up.
+    float margin_in(const Side& side) const {
+        return static_cast<float>((double{d_.options.margin} + d_.skin) * kRoundUp * side.per_step);
+    }
+    static constexpr double kRoundUp = 1 + 0x1p-20; // also pays for the rounding of margin |n|
+
+    // Opening a node takes one entry off and puts at most kMaxDegree on, and no pair lies deeper than both trees
+    // together.
+    static_assert(QueryContext::kEntries > 2 * (kMaxLevels - 1) * (kMaxDegree - 1) + 1);
+    Descent& d_;
+    QueryContext::Entry* const stack_;
+    uint32_t size_ = 0;
+    uint64_t pair_tests_ = 0, block_tests_ = 0;
+    const bool have_hulls_ = d_.a.tree.has_triangles() || d_.b.tree.has_triangles();
+    Side sides_[2];
+};
+
+Verdict descend_target(Descent& descent) {
+    return descent.options.margin + descent.skin > 0 ? Search<true>(descent).run() : Search<false>(descent).run();
+}
+
+} // namespace
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace prolate::query {
+HWY_EXPORT(descend_target);
+Verdict descend(Descent& descent) noexcept {
+    return HWY_DYNAMIC_DISPATCH(descend_target)(descent);
+}
+} // namespace prolate::query
+#endif // HWY_ONCE

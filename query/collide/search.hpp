@@ -1,0 +1,72 @@
+// One collide() query: what the vectorised descent (collide.cpp) and the decisions at its leaves (leaves.cpp) share.
+#pragma once
+
+#include "query/node/lattice.hpp"
+#include "query/node/tree_side.hpp"
+
+#include <prolate/collide.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+
+namespace prolate::query {
+
+struct Descent {
+    TreeSide a, b;
+    const RelativePose b_to_a;
+    const LatticePose lattice_b_to_a, lattice_a_to_b;
+    const QueryOptions options; // sound
+    QueryContext::Entry* const stack;
+    QueryStats stats;
+
+    bool all = false; ///< go on after the first pair
+    std::span<MeetingPair> pairs;
+    uint64_t found = 0;
+    void (*each)(void* user, const MeetingPair& pair) = nullptr; ///< is handed all pairs taken, if not null
+    void* each_user = nullptr;
+    uint64_t other_tests = 0;  ///< that `each` did, of the same budget
+    bool out_of_tests = false; ///< the budget ran out within a leaf
+
+    /// Nodes are parted only if they are farther apart than options.margin + skin, metres. Leaves that are nearer, but
+    /// beyond options.margin, shrink the skin to what they leave; so if the bodies turn out to be separated, they are
+    /// farther apart than margin + skin.
+    float skin = 0;
+    bool roots_meet = false;
+
+    Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, QueryContext& context,
+            const QueryOptions& query_options) noexcept;
+    Descent(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
+            QueryContext& context, const QueryOptions& query_options) noexcept
+        : Descent(tree_a, tree_b, relative_pose(pose_a, pose_b), context, query_options) {}
+
+    /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query. `normal` is 0, or
+    /// of any length, in A's frame, from A to B, and along it they may well be apart.
+    bool meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept;
+    /// Takes a pair that meets. True to stop the query.
+    bool take(const MeetingPair& pair) noexcept;
+    /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any. False
+    /// too if it is out of tests.
+    bool meets(const MeetingPair& pair) noexcept;
+
+    /// Tests left of the budget.
+    uint64_t left() const noexcept {
+        const uint64_t used = stats.tests() + other_tests;
+        return options.max_pair_tests - std::min(used, options.max_pair_tests);
+    }
+
+    /// Starts with this skin.
+    void set_skin(float distance) noexcept;
+
+private:
+    bool spend(uint64_t tests) noexcept;
+    template <class Apart> bool parted(Apart&& apart) noexcept;
+    bool apart_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept;
+    float least_skin_ = 0;
+    double corners_reach_ = -1; // S of corners.hpp, once it is asked for
+};
+
+/// The descent itself: separated, overlapping (surfaces or leaves), or undecided (out of budget).
+Verdict descend(Descent& descent) noexcept;
+
+} // namespace prolate::query

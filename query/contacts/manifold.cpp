@@ -1,0 +1,113 @@
+#include "query/contacts/manifold.hpp"
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace prolate::query {
+namespace {
+
+using glm::dvec3;
+
+constexpr double kSameNormal = 0.9;    // cosine
+constexpr double kAgreeing = 1 - 1e-6; // of the weights: a mean that is as long is one of the same normals
+constexpr double kPreferKnown = 1.1;
+constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
+
+// What is known keeps its place against others that are no better than rounding.
+bool instead(const Candidate& old, const Candidate& other, double ahead, double apart) {
+    if (old.known == other.known) return ahead > 0;
+    return ahead > (other.known ? -apart : apart);
+}
+
+} // namespace
+
+Patch::Patch(const dvec3& normal) noexcept : seed_(normal) {
+    const dvec3 across = std::abs(normal.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0);
+    x_ = glm::normalize(glm::cross(normal, across));
+    y_ = glm::cross(normal, x_);
+}
+
+bool Patch::takes(const dvec3& normal) const noexcept {
+    return glm::dot(normal, seed_) > kSameNormal;
+}
+
+void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap, double apart) noexcept {
+    sum_ += weight * normal, weight_ += weight;
+    overlap_ = std::max(overlap_, overlap);
+    const double x = glm::dot(x_, candidate.middle), y = glm::dot(y_, candidate.middle);
+    constexpr double kDiagonal = 0.7071067811865476;
+    const double values[] = {candidate.depth,     x,  y,  kDiagonal * (x + y),
+                             kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y),
+                             kDiagonal * (y - x)};
+    for (uint32_t i = 0; i < kSieve; ++i) {
+        const double same = i == 0 ? std::min(apart, kSameDepth * std::abs(candidate.depth)) : apart;
+        if (any_ && !instead(sieve_[i], candidate, values[i] - reach_[i], same)) continue;
+        reach_[i] = values[i], sieve_[i] = candidate;
+    }
+    any_ = true;
+}
+
+dvec3 Patch::normal() const noexcept {
+    const double length = glm::length(sum_);
+    return length > 0 ? sum_ / length : seed_;
+}
+
+bool Patch::mixed() const noexcept {
+    return glm::length(sum_) < kAgreeing * weight_;
+}
+
+uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept {
+    const dvec3 n = normal();
+    uint32_t count = 0;
+    // Takes the point that `measure` rates best, if above `least`.
+    const auto take = [&](double least, auto&& measure) {
+        const Candidate* best = nullptr;
+        for (const Candidate& c : sieve_) {
+            const double value = measure(c) * (c.known ? kPreferKnown : 1);
+            const auto same = [&](const Candidate& other) { return other.id == c.id; };
+            if (value > least && std::none_of(out, out + count, same)) least = value, best = &c;
+        }
+        if (best != nullptr) out[count++] = *best;
+        return best != nullptr;
+    };
+    // Of what is as deep as the deepest, the outermost: with equal depths a corner, not what lies between two.
+    dvec3 mean(0);
+    for (const Candidate& c : sieve_) mean += c.middle / double{kSieve};
+    const double as_deep = sieve_[0].depth - std::min(apart, kSameDepth * std::abs(sieve_[0].depth));
+    const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
+    if (!take(-0.5, outermost)) out[count++] = sieve_[0];
+    const dvec3 p = out[0].middle;
+    if (!take(apart, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
+    const dvec3 q = out[1].middle;
+    const double least_area = apart * glm::length(q - p);
+    const auto area = [&](const dvec3& a, const dvec3& b, const dvec3& c) {
+        return glm::dot(n, glm::cross(b - a, c - a));
+    };
+    if (!take(least_area, [&](const Candidate& c) { return std::abs(area(p, q, c.middle)); })) return count;
+    // What lies beyond an edge of the triangle adds another one with it.
+    const dvec3 r = out[2].middle;
+    const double outward = area(p, q, r) < 0 ? 1 : -1;
+    take(least_area, [&](const Candidate& c) {
+        const dvec3& s = c.middle;
+        return std::max({outward * area(p, q, s), outward * area(q, r, s), outward * area(r, p, s)});
+    });
+    return count;
+}
+
+void Patches::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept {
+    Patch* shallowest = &patches_[0];
+    for (uint32_t i = 0; i < count_; ++i) {
+        if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, apart_);
+        if (patches_[i].depth() < shallowest->depth()) shallowest = &patches_[i];
+    }
+    if (count_ < kMost)
+        shallowest = &patches_[count_++];
+    else if (!(candidate.depth > shallowest->depth()))
+        return;
+    *shallowest = Patch(normal);
+    shallowest->add(normal, candidate, weight, overlap, apart_);
+}
+
+} // namespace prolate::query

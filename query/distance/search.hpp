@@ -1,0 +1,92 @@
+// One distance() query: what the vectorised search (distance.cpp) and the decisions at its leaves (distance_leaves.cpp)
+// share. Everything in the frame of body A, in metres.
+#pragma once
+
+#include "query/node/lattice.hpp"
+#include "query/node/tree_side.hpp"
+#include "query/triangle/distance.hpp"
+
+#include <prolate/distance.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+
+namespace prolate::query {
+
+struct DistanceSearch {
+    TreeSide a, b;
+    const RelativePose b_to_a;
+    const LatticePose lattice_b_to_a, lattice_a_to_b;
+    const DistanceOptions options; // sound
+    QueryContext::Entry* const entries;
+    QueryStats stats;
+
+    bool complete = false;    ///< no budget ran out
+    bool overlapping = false; ///< the witness meets
+    /// Does one body hold a part of the other? Settled before the search, so that no budget that settles more of that
+    /// leaves too little for this.
+    Verdict enclosure = Verdict::separated;
+    /// Of all pairs of leaves: those decided are not nearer than `decided`, those ruled out than `skipped`, and those
+    /// still open, when a limit ended the search, than `open`.
+    double decided = kInfinity, skipped = kInfinity, open = kInfinity;
+    /// The nearest pair found, no farther apart than `upper`.
+    double upper = kInfinity;
+    MeetingPair witness;
+    glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0};
+    glm::dvec3 normal{0, 0, 0};   ///< unit, from on_a to on_b; 0 if they coincide or are not known
+    glm::dvec3 normal_b{0, 0, 0}; ///< the same as B's frame has it
+
+    DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
+                   QueryContext& context, const DistanceOptions& distance_options) noexcept;
+
+    /// What is at least so far apart, > 0, need not be looked at: it cannot improve the answer by more than the
+    /// tolerance, nor meet.
+    double enough() const {
+        const double improving = upper < kInfinity ? upper - tolerance(upper) : kInfinity;
+        return std::max(std::min(options.max_distance, improving), std::numeric_limits<double>::min());
+    }
+    /// What bounds around this distance may be apart.
+    double tolerance(double distance) const {
+        return std::max(options.tolerance_absolute, options.tolerance_relative * distance);
+    }
+    /// Tests left of the budget.
+    uint64_t left() const { return options.max_pair_tests - std::min(options.max_pair_tests, stats.tests()); }
+    double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
+
+    /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing
+    /// done, if the budget may not suffice.
+    bool decide(uint32_t node_a, uint32_t node_b, double bound) noexcept;
+    /// The same for what an earlier query found, which is not trusted to be of these trees.
+    bool try_first(const MeetingPair& pair) noexcept;
+
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    static constexpr double kLeastTolerance = 1e-12, kMostTolerance = 1;
+
+private:
+    // How far the corners of leaves reach along `normal`, or B's against it: few leaves are asked for often.
+    struct Support {
+        uint32_t leaf = UINT32_MAX;
+        double reach;
+    };
+    using Supports = std::array<Support, 16>;
+    Supports supports_a_, supports_b_;
+    double corners_reach_; // share of S (triangle.hpp) of all corners
+
+    double gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
+    void take(const TriangleDistance& found, const MeetingPair& pair, double bound, bool meet) noexcept;
+    void decide_ellipsoids(uint32_t node_a, uint32_t node_b, double bound) noexcept;
+    void decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,
+                          double bound) noexcept;
+};
+
+/// Bound on the distance of the roots, from spheres around them, in double precision.
+double root_bound(const DistanceSearch& search) noexcept;
+
+/// The search itself: leaves every pair of leaves decided, skipped or open.
+void search(DistanceSearch& query) noexcept;
+
+} // namespace prolate::query

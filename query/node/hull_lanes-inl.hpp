@@ -1,0 +1,48 @@
+// Hulls of exact trees' inner nodes (src/hull.hpp) along the direction that a lane found: a closer look at a pair of
+// nodes that an ellipsoid, and boxes, could not part. Per SIMD target; include it below hwy/foreach_target.h.
+// hull_reach() in query/node/lanes.cpp does the same operations in plain C++.
+//
+// With the terms of lanes-inl.hpp the nodes are apart if
+//     p - A - B > 0,   A = max v.w_i + share |v|, v = L1^T n,   B likewise with v = -L2^T n
+// for what the two hulls reach from their ellipsoids' centers: A <= a and B <= b but for rounding. |w| <= 1, so
+//   A         v is wrong by 14 u |n| |L1| as in a; 3 products and 2 sums, two rounded factors, their products and the
+//             last sum add 12 u |n| |L1|; B likewise
+//   gap + (a - A) + (b - B)      4 u |n| (|r| + |L1| + |L2|)
+// which the margin in `gap`, 32 u of each, pays for. The share of the ellipsoid is rounded up, and the points as stored
+// are exact: the builder measures what sticks out of their hull.
+//
+// Cost: about 40 vector operations a hull.
+#include "query/node/lanes-inl.hpp"
+
+// clang-format off
+#if defined(PROLATE_QUERY_HULL_LANES_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef PROLATE_QUERY_HULL_LANES_INL_HPP
+#undef PROLATE_QUERY_HULL_LANES_INL_HPP
+#else
+#define PROLATE_QUERY_HULL_LANES_INL_HPP
+#endif
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
+
+/// hull_reach() of lanes.hpp, which has the same operations; v = {x, y, z}.
+HWY_INLINE float hull_reach_here(const std::byte* hull, float x, float y, float z, float width) {
+    const LaneTag d;
+    const hn::Rebind<int8_t, LaneTag> d8;
+    Lanes most = hn::Set(d, -HUGE_VALF);
+    for (size_t i = 0; i < kHullPoints; i += hn::Lanes(d)) {
+        const auto row = [&](size_t k) {
+            const auto* const from = reinterpret_cast<const int8_t*>(hull + kHullPoint + kHullPoints * k + i);
+            return hn::ConvertTo(d, hn::PromoteTo(hn::Rebind<int32_t, LaneTag>(), hn::LoadU(d8, from)));
+        };
+        most = hn::Max(most, dot(row(0), row(1), row(2), hn::Set(d, x), hn::Set(d, y), hn::Set(d, z)));
+    }
+    const auto share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
+    const float reach = hn::GetLane(hn::MaxOfLanes(d, most)) * kPerHullUnit + share * kPerHullShare * width;
+    return share > 0 ? reach : width;
+}
+
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif // PROLATE_QUERY_HULL_LANES_INL_HPP

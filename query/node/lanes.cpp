@@ -1,0 +1,165 @@
+#include "query/node/lanes.hpp"
+
+#include <glm/mat3x3.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace prolate::query {
+
+namespace {
+
+// What a node's box says, in coordinates of its own tree: center and half the width.
+struct LaneBox {
+    float center[3], half[3];
+};
+LaneBox box_of(const std::byte* block, uint32_t lane) {
+    LaneBox out;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto byte = [&](size_t array) {
+            return int32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
+        };
+        const int32_t low = byte(kBlockBoxLow), high = byte(kBlockBoxHigh);
+        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
+        const float half_step = std::bit_cast<float>((126 + exponent) << 23);
+        const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
+        out.center[i] = origin + static_cast<float>(low + high) * half_step;
+        out.half[i] = static_cast<float>(high - low) * half_step + (kBoxMargin * std::abs(out.center[i]) + kBoxSlack);
+    }
+    return out;
+}
+
+// All that follows from the center and the factor.
+void complete(double reach, Single& s) {
+    const auto& f = s.factor;
+    for (size_t i = 0; i < 3; ++i) {
+        const size_t j = (i + 1) % 3;
+        s.diagonal[i] = f[0][i] * f[0][i] + f[1][i] * f[1][i] + f[2][i] * f[2][i];
+        s.off_diagonal[i] = f[0][i] * f[0][j] + f[1][i] * f[1][j] + f[2][i] * f[2][j];
+    }
+    s.size = std::sqrt(s.diagonal[0] + s.diagonal[1] + s.diagonal[2]);
+    s.weight = 1 / s.size;
+    const float center = std::abs(s.center[0]) + std::abs(s.center[1]) + std::abs(s.center[2]);
+    s.slack = kLaneMargin * (center + s.size) + common_slack(reach);
+    s.reach = reach;
+    for (size_t i = 0; i < 3; ++i) {
+        const float half = std::sqrt(s.diagonal[i]) + s.slack; // slack is far above what rounding costs here
+        s.low[i] = s.center[i] - half, s.high[i] = s.center[i] + half;
+    }
+}
+
+} // namespace
+
+Single place(const std::byte* block, uint32_t lane, const LatticePose& pose, PlacedBox* placed_box) noexcept {
+    const LaneNode e = load_node(block, lane, pose.exponent_from);
+    const LaneBox box = box_of(block, lane);
+    Single s{};
+    const auto& m = pose.linear;
+    const auto& r = pose.linear_rounded;
+    const double x = e.center[0], y = e.center[1], z = e.center[2];
+    for (size_t i = 0; i < 3; ++i) {
+        s.exact[i] = (m[0][i] * x + m[1][i] * y) + (m[2][i] * z + pose.offset[i]);
+        s.center[i] = static_cast<float>(s.exact[i]);
+        s.factor[0][i] = r[0][i] * e.l11 + r[1][i] * e.l21 + r[2][i] * e.l31;
+        s.factor[1][i] = r[1][i] * e.l22 + r[2][i] * e.l32;
+        s.factor[2][i] = r[2][i] * e.l33;
+    }
+    complete(pose.reach, s);
+    // Cut with the box around the node's own box, as it lies in these coordinates.
+    float away[3];
+    for (size_t i = 0; i < 3; ++i) away[i] = box.center[i] - e.center[i];
+    float turned[3], around[3]; // the box's center, and half the sides of the box around it
+    for (size_t i = 0; i < 3; ++i) {
+        turned[i] = r[0][i] * away[0] + r[1][i] * away[1] + r[2][i] * away[2];
+        around[i] = std::abs(r[0][i]) * box.half[0] + std::abs(r[1][i]) * box.half[1] + std::abs(r[2][i]) * box.half[2];
+        const float at = s.center[i] + turned[i], half = s.slack + around[i];
+        if (at - half > s.low[i]) s.low[i] = at - half;
+        if (at + half < s.high[i]) s.high[i] = at + half;
+    }
+    if (placed_box == nullptr) return s;
+    for (size_t i = 0; i < 3; ++i) {
+        placed_box->center[i] = turned[i];
+        for (size_t c = 0; c < 3; ++c) placed_box->axis[c][i] = r[c][i] * box.half[c];
+    }
+    const auto farthest = [&](size_t i) { return std::abs(turned[i]) + around[i]; };
+    placed_box->slack = kLaneMargin * (farthest(0) + farthest(1) + farthest(2));
+    return s;
+}
+
+Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexcept {
+    const double per_step = power_of_two(-lattice.step_exponent);
+    Single s{};
+    double reach = ellipsoid.reach * per_step;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto g = static_cast<glm::length_t>(i);
+        s.exact[i] = ellipsoid.center[g] * per_step - lattice.origin[i];
+        s.center[i] = static_cast<float>(s.exact[i]);
+        reach += std::abs(static_cast<double>(lattice.origin[i]));
+        for (size_t column = 0; column < 3; ++column)
+            s.factor[column][i] =
+                static_cast<float>(ellipsoid.factor[static_cast<glm::length_t>(column)][g] * per_step);
+    }
+    complete(reach, s);
+    return s;
+}
+
+bool boxes_apart(const std::byte* block, uint32_t lane, const Single& s, float margin) noexcept {
+    bool apart = false;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto byte = [&](size_t array) {
+            return int32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
+        };
+        const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
+        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
+        const float per_step = std::bit_cast<float>((127 - exponent) << 23);
+        const float low = ((s.low[i] - margin) - origin) * per_step, high = ((s.high[i] + margin) - origin) * per_step;
+        const float least = std::min(low > 0 ? low + kAlmostOne : 0.0f, 256.0f);
+        const float most = std::max(high < 255 ? high : 255.0f, -1.0f);
+        apart |= byte(kBlockBoxHigh) < static_cast<int32_t>(least) || byte(kBlockBoxLow) > static_cast<int32_t>(most);
+    }
+    return apart;
+}
+
+LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& s) noexcept {
+    const LaneNode e = load_node(block, lane, step_exponent);
+    const auto dot = [](float x, float y, float z, float u, float v, float w) { return x * u + y * v + z * w; };
+    const float xx = e.l11 * e.l11, yx = e.l21 * e.l11, zx = e.l31 * e.l11;
+    const float yy = e.l21 * e.l21 + e.l22 * e.l22, zy = e.l31 * e.l21 + e.l32 * e.l22;
+    const float zz = dot(e.l31, e.l32, e.l33, e.l31, e.l32, e.l33);
+    LaneGap out{};
+    out.size = std::sqrt(xx + yy + zz);
+    const float w2 = 1 / (out.size * (out.size + s.size)), w1 = out.size * w2 * s.weight;
+    const auto mix = [&](float q1, float q2) { return w1 * q1 + w2 * q2; };
+    const float qxx = mix(s.diagonal[0], xx), qyy = mix(s.diagonal[1], yy), qzz = mix(s.diagonal[2], zz);
+    const float qyz = mix(s.off_diagonal[1], zy), qxz = mix(s.off_diagonal[2], zx), qxy = mix(s.off_diagonal[0], yx);
+    const float rx = e.center[0] - s.center[0], ry = e.center[1] - s.center[1], rz = e.center[2] - s.center[2];
+    const float axx = qyy * qzz - qyz * qyz, ayy = qxx * qzz - qxz * qxz, azz = qxx * qyy - qxy * qxy;
+    const float axy = qxz * qyz - qxy * qzz, axz = qxy * qyz - qxz * qyy, ayz = qxy * qxz - qxx * qyz;
+    const float x = dot(axx, axy, axz, rx, ry, rz), y = dot(axy, ayy, ayz, rx, ry, rz),
+                z = dot(axz, ayz, azz, rx, ry, rz);
+    const auto along = [&](size_t c) { return dot(s.factor[c][0], s.factor[c][1], s.factor[c][2], x, y, z); };
+    const float a1 = along(0), a2 = along(1), a3 = along(2);
+    const float b1 = dot(e.l11, e.l21, e.l31, x, y, z), b2 = e.l22 * y + e.l32 * z, b3 = e.l33 * z;
+    const float a = std::sqrt(a1 * a1 + a2 * a2 + a3 * a3), b = std::sqrt(b1 * b1 + b2 * b2 + b3 * b3);
+    const float p = dot(x, y, z, rx, ry, rz), sum = a + b, length = std::abs(x) + std::abs(y) + std::abs(z);
+    out.gap = p - sum - (s.slack + kLaneMargin * out.size) * length;
+    out.square = x * x + y * y + z * z;
+    out.depth = p / sum;
+    if (!(length > kLaneDirection)) out.gap = 0;
+    return out;
+}
+
+float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept {
+    float most = -HUGE_VALF;
+    for (size_t i = 0; i < kHullPoints; ++i) {
+        const auto along = [&](size_t k) {
+            return static_cast<float>(load_le<int8_t>(hull + kHullPoint + kHullPoints * k + i)) * v[k];
+        };
+        most = std::max(most, along(0) + along(1) + along(2));
+    }
+    const auto share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
+    return share > 0 ? most * kPerHullUnit + share * kPerHullShare * width : width;
+}
+
+} // namespace prolate::query

@@ -1,0 +1,117 @@
+// What the culling test of lanes-inl.hpp takes and gives, and the same test on one lane in plain C++: the operations of
+// the SIMD kernel in the same order, so that both give the same bits. Tests compare the two; nothing else uses it.
+#pragma once
+
+#include "query/node/lattice.hpp"
+#include "src/block.hpp"
+#include "src/bytes.hpp"
+#include "src/hull.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace prolate::query {
+
+inline constexpr float kLaneMargin = 0x1p-19f;    ///< 32 u, u = 2^-24: see lanes-inl.hpp
+inline constexpr float kLaneDirection = 0x1p-60f; ///< least |n|_1 of a direction that may separate
+/// Bounds the length of a stored center, lattice steps.
+inline constexpr float kLargestCenter = 113512;
+/// 8 u: half a box's width grows by this share of the length of the box's center, and by kBoxSlack = 2^16 kBoxMargin.
+inline constexpr float kBoxMargin = 0x1p-21f, kBoxSlack = 0x1p-5f;
+/// What a hull record's integers count.
+inline constexpr auto kPerHullUnit = static_cast<float>(1 / kHullUnit),
+                      kPerHullShare = static_cast<float>(1 / kHullShares);
+/// Turns truncation into rounding up, or down by at most 2^-10.
+inline constexpr float kAlmostOne = 1 - 0x1p-10f;
+
+/// An ellipsoid in the lattice coordinates of the block it is tested against. Vectors have a fourth component, which
+/// kernels carry along: of columns, it repeats the first; of boxes, it means nothing.
+struct Single {
+    alignas(32) double exact[4]; ///< the center before it was rounded to float
+    alignas(16) float center[4];
+    alignas(16) float factor[3][4];    ///< L1, columns
+    alignas(16) float diagonal[4];     ///< of Q1 = L1 L1^T: xx, yy, zz
+    alignas(16) float off_diagonal[4]; ///< xy, yz, zx
+    alignas(16) float low[4];          ///< its box in these coordinates, outward rounded
+    alignas(16) float high[4];
+    float size;   ///< |L1|
+    float weight; ///< 1 / size
+    float slack;  ///< the lane-independent part of the margin, a multiple of |n|_1
+    double reach; ///< bounds every length that entered it: rounding in double costs less than 2^-44 of it
+};
+
+/// The box of a node where its ellipsoid is a Single: {center + t0 axis[0] + t1 axis[1] + t2 axis[2] : |ti| <= 1}.
+/// Along n it reaches no farther than center.n + sum |axis.n| + slack |n|, in whatever order floats sum that up.
+struct PlacedBox {
+    alignas(16) float center[4];  ///< from the ellipsoid's center
+    alignas(16) float axis[3][4]; ///< half the sides
+    float slack;
+};
+
+/// What the squares of a node's factor are multiples of, in steps: a normal float, since open() bounds the exponents.
+inline constexpr int32_t kFactorBias = 127 - 30;
+inline float factor_unit(int32_t exponent, int32_t step_exponent) {
+    return std::bit_cast<float>((exponent + (kFactorBias - step_exponent)) << 23);
+}
+
+/// A node as stored, lattice steps of its own tree.
+struct LaneNode {
+    float center[3];
+    float l11, l21, l22, l31, l32, l33;
+};
+inline LaneNode load_node(const std::byte* block, uint32_t lane, int32_t step_exponent) {
+    const auto at = [&](size_t array, size_t i) { return block + block_offset(array, i, lane); };
+    const auto natural = [&](size_t array, size_t i) { return static_cast<float>(load_le<uint16_t>(at(array, i))); };
+    const float unit = factor_unit(load_le<int8_t>(block + kBlockExponent + lane), step_exponent);
+    const auto diagonal = [&](size_t i) {
+        const float q = natural(kBlockDiagonal, i);
+        return q * unit * q;
+    };
+    const auto off_diagonal = [&](size_t i) {
+        const auto q = static_cast<float>(load_le<int16_t>(at(kBlockOffDiagonal, i)));
+        return q * unit * std::abs(q);
+    };
+    return {{natural(kBlockCenter, 0), natural(kBlockCenter, 1), natural(kBlockCenter, 2)},
+            diagonal(0),
+            off_diagonal(0),
+            diagonal(1),
+            off_diagonal(1),
+            off_diagonal(2),
+            diagonal(2)};
+}
+
+/// The share of Single::slack that is the same for all nodes.
+inline float common_slack(double reach) {
+    return kLaneMargin * kLargestCenter + static_cast<float>(0x1p-42 * reach);
+}
+
+/// Node `lane` of `block`, which belongs to the tree that `pose` comes from, and if `box` is not null its box.
+Single place(const std::byte* block, uint32_t lane, const LatticePose& pose, PlacedBox* box = nullptr) noexcept;
+/// An ellipsoid given in metres of a body frame, in the lattice of a tree in the same frame.
+Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexcept;
+
+/// Is the lane's box certainly apart from that of the single, by more than `margin` along an axis?
+bool boxes_apart(const std::byte* block, uint32_t lane, const Single& single, float margin) noexcept;
+
+/// One lane's outcome.
+struct LaneGap {
+    float gap;    ///< p - a - b less the margin, a multiple of |n|: positive only if they are apart; else possibly NaN
+    float square; ///< |n|^2
+    float depth;  ///< p / (a + b): below 1 they overlap as seen along n, 0 at equal centers
+    float size;   ///< |L2|
+};
+LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& single) noexcept;
+
+/// The record of the inner node in `lane` of `block`, of those that begin at `hulls`; null if that is.
+inline const std::byte* hull_of(const std::byte* hulls, const std::byte* block, uint32_t lane) {
+    const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
+    return hulls != nullptr ? hulls + size_t{first / kBlockLanes} * kHullBytes : nullptr;
+}
+/// How far what a hull record (src/hull.hpp) describes reaches from its node's center along n: v = L^T n, width = |v|.
+/// If the record knows nothing, `width`.
+float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept;
+
+} // namespace prolate::query

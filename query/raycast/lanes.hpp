@@ -1,0 +1,60 @@
+// What the ray tests of lanes-inl.hpp take and give, and the same tests on one lane in plain C++: the operations of
+// the SIMD kernels in the same order, so that both give the same bits. Tests compare the two; nothing else uses it.
+#pragma once
+
+#include "query/inside/axis_lanes.hpp"
+#include "query/node/lanes.hpp"
+
+#include "src/block.hpp"
+#include "src/bytes.hpp"
+
+#include <prolate/tree.hpp>
+
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace prolate::query {
+
+/// The part of a ray that may meet a tree, in the tree's lattice coordinates: origin + s span, 0 <= s <= 1.
+struct LatticeRay {
+    float origin[3], span[3];
+    float inverse[3]; ///< 1 / span; of a span that is (nearly) 0, one of the same sign that moves less than rounding
+    float thickness;  ///< nodes that come as near to the ray as this are met, too; 0, or rounded up
+    float slack;      ///< ray_slack()
+};
+/// From doubles in lattice coordinates that are right within 2^-44 reach.
+LatticeRay lattice_ray(const double origin[3], const double span[3], double reach, double thickness = 0) noexcept;
+
+/// A ray as a block's boxes see it, in box steps: it passes the side of a box at x where s = (x - near) inverse, or
+/// with `far` for the sides that it leaves through.
+struct BoxRay {
+    float near[3], far[3], inverse[3];
+    size_t near_side[3], far_side[3]; ///< where the eight sides of each kind are in the block
+};
+inline BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
+    BoxRay out;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
+        const auto step = std::bit_cast<float>((127 + exponent) << 23),
+                   per_step = std::bit_cast<float>((127 - exponent) << 23);
+        const double begin = load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
+        const auto origin = static_cast<float>(ray.origin[i] - begin);
+        const float wider = ray.thickness + (ray.slack + kLaneMargin * std::abs(origin));
+        const bool forward = !(ray.inverse[i] < 0);
+        const size_t low = kBlockBoxLow + kBlockLanes * i, high = kBlockBoxHigh + kBlockLanes * i;
+        out.near[i] = (forward ? origin + wider : origin - wider) * per_step;
+        out.far[i] = (forward ? origin - wider : origin + wider) * per_step;
+        out.inverse[i] = ray.inverse[i] * step;
+        out.near_side[i] = forward ? low : high, out.far_side[i] = forward ? high : low;
+    }
+    return out;
+}
+
+/// The scalar references, for one lane.
+float box_entry(const std::byte* block, uint32_t lane, const BoxRay& ray, float limit) noexcept;
+float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticeRay& ray,
+                float limit) noexcept;
+
+} // namespace prolate::query

@@ -1,0 +1,222 @@
+#include "query/raycast/ray.hpp"
+
+#include "query/ellipsoid/convert.hpp"
+#include "query/ellipsoid/nearest_direction.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace prolate::query {
+namespace {
+
+using glm::dmat3;
+using glm::dvec3;
+
+double norm1(double x, double y) {
+    return std::abs(x) + std::abs(y);
+}
+
+// L^-1 x and L^-T x.
+dvec3 solve(const dmat3& l, const dvec3& x) {
+    const double u = x.x / l[0][0], v = (x.y - l[0][1] * u) / l[1][1];
+    return {u, v, (x.z - l[0][2] * u - l[1][2] * v) / l[2][2]};
+}
+dvec3 solve_transposed(const dmat3& l, const dvec3& x) {
+    const double w = x.z / l[2][2], v = (x.y - l[1][2] * w) / l[1][1];
+    return {(x.x - l[0][1] * v - l[0][2] * w) / l[0][0], v, w};
+}
+
+// A corner where the ray is the z-axis.
+struct Corner {
+    double x, y, z;
+};
+
+// Where a triangle that is nearly a segment comes near to the axis; empty if low > high.
+struct Depths {
+    double low = std::numeric_limits<double>::infinity(), high = -low, first = low;
+};
+Depths depths_of_edges(const Corner (&c)[3], double near) {
+    Depths out;
+    for (size_t i = 0; i < 3; ++i) {
+        const Corner &a = c[i], &b = c[(i + 1) % 3];
+        const double x = b.x - a.x, y = b.y - a.y, z = b.z - a.z, square = x * x + y * y;
+        const double s = square > 0 ? std::clamp(-(a.x * x + a.y * y) / square, 0.0, 1.0) : 0;
+        if (norm1(a.x + s * x, a.y + s * y) > near) continue;
+        const double depth = a.z + s * z, extent = norm1(x, y);
+        // An edge along the axis is met anywhere.
+        const bool along_axis = !(extent > 4 * near);
+        const double doubt = along_axis ? std::abs(z) : 4 * near / extent * std::abs(z);
+        out.low = std::min(out.low, depth - doubt), out.high = std::max(out.high, depth + doubt);
+        out.first = std::min(out.first, along_axis ? std::min(a.z, b.z) : depth);
+    }
+    return out;
+}
+
+// Bodies as the ray sees them that shall come near: a point, how far they reach along n, and the direction from their
+// point that is nearest to x; 0 if x is one of them.
+class NearEllipsoid {
+public:
+    explicit NearEllipsoid(const PlacedEllipsoid& e) : e_(e), q_(e.factor * glm::transpose(e.factor)) {}
+    dvec3 middle() const { return e_.center; }
+    double end(const dvec3& n) const { return glm::dot(n, e_.center) + glm::length(n * e_.factor); }
+    dvec3 towards(const dvec3& x) const {
+        const dvec3 r = x - e_.center;
+        return glm::length(solve(e_.factor, r)) > 1 ? outwards(e_.factor, q_, r) : dvec3(0);
+    }
+
+private:
+    const PlacedEllipsoid& e_;
+    const dmat3 q_;
+};
+
+class NearTriangle {
+public:
+    explicit NearTriangle(const PlacedTriangle& t) : c_(t.corner) {}
+    dvec3 middle() const { return (c_[0] + c_[1] + c_[2]) / 3.0; }
+    double end(const dvec3& n) const { return std::max({glm::dot(n, c_[0]), glm::dot(n, c_[1]), glm::dot(n, c_[2])}); }
+    // Ericson 2005, section 5.1.5.
+    dvec3 towards(const dvec3& x) const {
+        const dvec3 ab = c_[1] - c_[0], ac = c_[2] - c_[0], a = x - c_[0], b = x - c_[1], c = x - c_[2];
+        const double d1 = glm::dot(ab, a), d2 = glm::dot(ac, a), d3 = glm::dot(ab, b), d4 = glm::dot(ac, b),
+                     d5 = glm::dot(ab, c), d6 = glm::dot(ac, c);
+        if (d1 <= 0 && d2 <= 0) return a;
+        if (d3 >= 0 && d4 <= d3) return b;
+        if (d6 >= 0 && d5 <= d6) return c;
+        const double wc = d1 * d4 - d3 * d2, wb = d5 * d2 - d1 * d6, wa = d3 * d6 - d5 * d4; // areas
+        if (wc <= 0 && d1 >= 0 && d3 <= 0) return a - d1 / (d1 - d3) * ab;
+        if (wb <= 0 && d2 >= 0 && d6 <= 0) return a - d2 / (d2 - d6) * ac;
+        if (wa <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return b - (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (ac - ab);
+        const dvec3 n = glm::cross(ab, ac);
+        return glm::dot(n, a) < 0 ? -n : n;
+    }
+
+private:
+    const dvec3 (&c_)[3];
+};
+
+constexpr int kNewtonSteps = 64;
+
+template <class Body>
+std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Body& body, double tolerance) {
+    dvec3 n(0);
+    double gap = 0, slope = 0; // along n, of the ray's begin; and how it grows
+    const auto look_from = [&](double t) {
+        n = body.towards(ray.origin + t * ray.direction);
+        n /= glm::length(n); // NaN if 0, which claims nothing
+        gap = glm::dot(n, ray.origin) - body.end(n) - distance, slope = glm::dot(n, ray.direction);
+    };
+    // Most that miss do so where they come near to the body's middle.
+    const double square = glm::dot(ray.direction, ray.direction);
+    look_from(std::clamp(glm::dot(body.middle() - ray.origin, ray.direction) / square, 0.0, ray.length));
+    if (gap > tolerance && gap + ray.length * slope > tolerance) return {};
+
+    double t = 0;
+    for (int i = 0; i < kNewtonSteps; ++i) {
+        look_from(t);
+        // Certainly apart until the gap falls to `tolerance`; the hit is certain enough within twice that.
+        const double here = gap + t * slope - tolerance;
+        if (!(here > tolerance)) break;
+        if (gap + ray.length * slope > tolerance) return {};
+        const double next = t - here / slope;
+        if (!(next > t)) break;
+        t = std::min(next, ray.length);
+    }
+    const double room = t == 0 ? gap : gap + t * slope + distance; // NaN inside the body
+    return RayHit{t, room >= 0 ? n : dvec3(0)};
+}
+
+} // namespace
+
+PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllipsoid& bound, double distance) noexcept {
+    const dvec3 origin = to_frame.translation;
+    const dvec3 direction = to_frame.rotation * to_double(ray.direction);
+    const double speed = glm::length(direction);
+    // Whatever is met lies in the ball around the bound, or near it, so |t - middle| speed is at most its radius.
+    const double reach = to_frame.distance + bound.reach + distance,
+                 radius = bound.size + distance + kSeparationMargin * reach;
+    const double middle = glm::dot(bound.center - origin, direction) / (speed * speed), half = radius / speed;
+    const double begin = std::max(0.0, middle - half), end = std::min(double{ray.max_t}, middle + half);
+    PlacedRay out{};
+    out.valid = std::isfinite(begin) && std::isfinite(end);
+    out.empty = begin > end;
+    out.origin = origin + begin * direction, out.direction = direction;
+    out.begin = begin, out.length = end - begin;
+    out.reach = reach + end * speed;
+    return out;
+}
+
+std::optional<RayHit> hit(const PlacedRay& ray, const PlacedEllipsoid& e, double margin) noexcept {
+    const dvec3 r = e.center - ray.origin;
+    const dvec3 y = solve(e.factor, -r), v = solve(e.factor, ray.direction);
+    const double vv = glm::dot(v, v), nearest = -glm::dot(y, v) / vv;
+    const dvec3 m = y + nearest * v;
+    const double back = std::sqrt(std::max(0.0, 1 - glm::dot(m, m)) / vv);
+    const bool ahead = nearest > back;
+    const dvec3 z = ahead ? m - back * v : y, normal = solve_transposed(e.factor, z);
+    const double gap = -glm::dot(normal, r) - glm::length(normal * e.factor);
+    const double far = std::max(0.0, -ray.length * glm::dot(normal, ray.direction));
+    if (gap - far > margin * glm::length(normal) * (ray.reach + e.reach)) return {};
+    if (!ahead) return RayHit{0, glm::dot(y, y) < 1 ? dvec3(0) : normal};
+    return RayHit{std::min(nearest - back, ray.length), normal};
+}
+
+std::optional<RayHit> hit(const PlacedRay& ray, const PlacedTriangle& triangle, double margin) noexcept {
+    const dvec3 d = ray.direction;
+    const double tau = margin * (ray.reach + triangle.reach);
+    const glm::length_t k = std::abs(d.x) > std::abs(d.y) ? (std::abs(d.x) > std::abs(d.z) ? 0 : 2)
+                                                          : (std::abs(d.y) > std::abs(d.z) ? 1 : 2);
+    const glm::length_t i = (k + 1) % 3, j = (k + 2) % 3;
+    const double shear_x = d[i] / d[k], shear_y = d[j] / d[k], sign = d[k] < 0 ? -1 : 1;
+    Corner c[3];
+    for (size_t n = 0; n < 3; ++n) {
+        const dvec3 p = triangle.corner[n] - ray.origin;
+        c[n] = {p[i] - shear_x * p[k], p[j] - shear_y * p[k], sign * p[k]};
+    }
+    const auto [left, right] = std::minmax({c[0].x, c[1].x, c[2].x});
+    const auto [bottom, top] = std::minmax({c[0].y, c[1].y, c[2].y});
+    const auto [low, high] = std::minmax({c[0].z, c[1].z, c[2].z});
+    const double end = ray.length * std::abs(d[k]);
+    if (left > tau || right < -tau || bottom > tau || top < -tau || high < -tau || low > end + tau) return {};
+
+    double weight[3], error = 0; // of the opposite corners
+    bool positive = false, negative = false;
+    for (size_t n = 0; n < 3; ++n) {
+        const Corner &a = c[(n + 1) % 3], &b = c[(n + 2) % 3];
+        weight[n] = a.x * b.y - a.y * b.x;
+        const double bound = tau * (norm1(a.x, a.y) + norm1(b.x, b.y));
+        positive = positive || weight[n] > bound, negative = negative || weight[n] < -bound;
+        error += bound;
+    }
+    if (positive && negative) return {};
+    double depth, from, to;
+    if (positive || negative) {
+        double sum = 0;
+        for (double& w : weight) w = negative ? std::max(-w, 0.0) : std::max(w, 0.0), sum += w;
+        depth = std::clamp((weight[0] * c[0].z + weight[1] * c[1].z + weight[2] * c[2].z) / sum, low, high);
+        const double doubt = std::min(1.0, error / sum) * (high - low);
+        from = depth - doubt, to = depth + doubt;
+    } else {
+        const Depths depths = depths_of_edges(c, 16 * tau);
+        depth = depths.first, from = depths.low, to = depths.high;
+    }
+    if (to < -tau || from > end + tau) return {};
+    const dvec3 normal = glm::cross(triangle.corner[1] - triangle.corner[0], triangle.corner[2] - triangle.corner[0]);
+    return RayHit{std::clamp(depth / std::abs(d[k]), 0.0, ray.length), normal};
+}
+
+std::optional<RayHit> hit_within(double distance, const PlacedRay& ray, const PlacedEllipsoid& e,
+                                 double margin) noexcept {
+    return approach(distance, ray, NearEllipsoid(e), margin * (ray.reach + e.reach + distance));
+}
+
+std::optional<RayHit> hit_within(double distance, const PlacedRay& ray, const PlacedTriangle& triangle,
+                                 double margin) noexcept {
+    return approach(distance, ray, NearTriangle(triangle), margin * (ray.reach + triangle.reach + distance));
+}
+
+} // namespace prolate::query

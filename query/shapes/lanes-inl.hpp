@@ -1,0 +1,77 @@
+// The culling tests of shapes: one rounded box or half-space against the eight lanes of a block, in single precision.
+// Per SIMD target; include it below hwy/foreach_target.h. query/shapes/lanes.cpp does the same operations on one lane
+// in plain C++.
+//
+// The direction n is that of lanes-inl.hpp, for an ellipsoid of about the box's shape. The certificate is the box's
+// own:
+//     n.r - |L^T n| - sum |n.e_i| - rho |n| > 0,                                                                    (1)
+// valid for any n, and tighter than any ellipsoid around the box. Before that, the lanes' boxes are compared with the
+// shape's. A half-space has one direction for all lanes.
+//
+// Rounding, in the terms of lanes-inl.hpp, u = 2^-24:
+//   n.r            |n| (4 u |r| + |dc1|), |dc1| <= u |c1| + 2^-44 reach
+//   |L^T n|        7 u |n| |L|
+//   |n.e_i|        rounded once (u), 3 products and 2 sums: 5 u |n| |e_i|
+//   rho |n|        6 u |n| rho
+//   their sums     4 u |n| (|r| + |L| + sum |e_i| + rho)
+// With |r| <= |c1| + |c2|, (1) is wrong by at most |n| (u (9 |c1| + 8 |c2| + 11 |L| + 10 (sum |e_i| + rho)) + 2^-44
+// reach), and is taken for true only beyond kLaneMargin |n|_1 (|c1|_1 + |c2| + |L| + sum |e_i|_1 + rho) + 2^-42 |n|_1
+// reach: 32 u. Half-space: the normal is rounded once, so n.c2 is wrong by 4 u |c2|, the offset d by u |d| + 2^-44
+// reach, and kLaneMargin (|c2| + |L| + |d|) + 2^-42 reach is demanded. Underflow and NaN: as in lanes-inl.hpp.
+//
+// Cost: about 170 vector operations for a box, 40 for a half-space.
+#include "query/node/lanes-inl.hpp"
+#include "query/shapes/lanes.hpp"
+
+// clang-format off
+#if defined(PROLATE_QUERY_SHAPE_LANES_INL_HPP) == defined(HWY_TARGET_TOGGLE)
+#ifdef PROLATE_QUERY_SHAPE_LANES_INL_HPP
+#undef PROLATE_QUERY_SHAPE_LANES_INL_HPP
+#else
+#define PROLATE_QUERY_SHAPE_LANES_INL_HPP
+#endif
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
+
+struct LaneGaps {
+    Lanes gap, key; ///< as ShapeGap
+};
+
+HWY_INLINE LaneGaps shape_gaps(const LaneNodes& e, const LaneRoundedBox& box) {
+    const LaneTag d;
+    const auto set = [d](float value) { return hn::Set(d, value); };
+    const LaneTerms t = evaluate(e, box.single);
+    const auto along = [&](const float(&edge)[3]) {
+        return hn::Abs(dot(set(edge[0]), set(edge[1]), set(edge[2]), t.x, t.y, t.z));
+    };
+    const Lanes edges = hn::Add(hn::Add(along(box.edges[0]), along(box.edges[1])), along(box.edges[2]));
+    const Lanes round = hn::Mul(set(box.radius), hn::Sqrt(sum_of_squares(t.x, t.y, t.z)));
+    const Lanes sum = hn::Add(t.b, hn::Add(edges, round));
+    const Lanes slack = hn::Add(set(box.slack), hn::Mul(set(kLaneMargin), t.size));
+    const Lanes gap = hn::Sub(hn::Sub(t.p, sum), hn::Mul(slack, t.length));
+    return {hn::IfThenElse(hn::Gt(t.length, set(kLaneDirection)), gap, hn::Zero(d)), hn::Div(t.p, sum)};
+}
+
+HWY_INLINE LaneGaps shape_gaps(const LaneNodes& e, const LaneHalfSpace& half_space) {
+    const LaneTag d;
+    const auto set = [d](float value) { return hn::Set(d, value); };
+    const LaneVector n{set(half_space.normal[0]), set(half_space.normal[1]), set(half_space.normal[2])};
+    const Lanes height = hn::Sub(dot(n.x, n.y, n.z, e.x, e.y, e.z), set(half_space.offset)), wide = width(e, n);
+    const Lanes low = hn::Sub(height, wide);
+    const Lanes slack = hn::Add(set(half_space.slack), hn::Mul(set(kLaneMargin), shapes_of(e).size));
+    return {hn::Sub(low, slack), low};
+}
+
+/// Bit i: the boxes do not tell lane i apart from the shape.
+HWY_INLINE uint32_t boxes_meet_shape(const std::byte* block, const LaneRoundedBox& box) {
+    return boxes_meet(block, box.single, 0);
+}
+HWY_INLINE uint32_t boxes_meet_shape(const std::byte*, const LaneHalfSpace&) {
+    return (1u << kBlockLanes) - 1;
+}
+
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif // PROLATE_QUERY_SHAPE_LANES_INL_HPP

@@ -1,0 +1,126 @@
+#include "query/triangle/climb.hpp"
+
+#include "query/ellipsoid/convert.hpp"
+#include "src/block.hpp"
+#include "src/bytes.hpp"
+#include "src/power_of_two.hpp"
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace prolate::query {
+namespace {
+
+using glm::dvec3;
+
+// A point in lattice coordinates of a tree, for tests against nodes' boxes.
+class BoxProbe {
+public:
+    BoxProbe(const LatticeInfo& lattice, const Vec3& p) {
+        const double per_step = power_of_two(-lattice.step_exponent);
+        const float metres[3] = {p.x, p.y, p.z};
+        for (size_t i = 0; i < 3; ++i) at_[i] = double{metres[i]} * per_step - lattice.origin[i];
+    }
+    // Bit i: the box of lane i may hold the point.
+    uint32_t lanes(const std::byte* block) const {
+        uint32_t out = 0xff;
+        for (size_t i = 0; i < 3; ++i) {
+            const double per_step = power_of_two(-int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)});
+            const double x = at_[i] - load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
+            // Box steps, the whole ones below and above: rounding is far below the slack.
+            const int32_t below = static_cast<int32_t>(std::clamp((x + kSlack) * per_step, -1.0, 255.0) + 1) - 1,
+                          above = 256 - static_cast<int32_t>(256 - std::clamp((x - kSlack) * per_step, 0.0, 256.0));
+            uint32_t held = 0;
+            for (size_t lane = 0; lane < kBlockLanes; ++lane) {
+                const int32_t low = load_le<uint8_t>(block + kBlockBoxLow + kBlockLanes * i + lane),
+                              high = load_le<uint8_t>(block + kBlockBoxHigh + kBlockLanes * i + lane);
+                held |= static_cast<uint32_t>(low <= below && high >= above) << lane;
+            }
+            out &= held;
+        }
+        return out;
+    }
+
+private:
+    static constexpr double kSlack = 0x1p-10; // lattice steps
+    double at_[3];
+};
+
+} // namespace
+
+double Hills::height(uint32_t vertex, const dvec3& up) const noexcept {
+    return glm::dot(up, to_double(tree_.vertex(vertex)));
+}
+
+// Calls visit(corners) for each triangle that has this vertex.
+template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) const {
+    if (tests_ > most_tests_) return;
+    const BoxProbe probe(tree_.lattice(), tree_.vertex(vertex));
+    struct Family {
+        uint32_t first, left; // siblings from slot `first` on
+    };
+    Family stack[(kBlockLanes + 1) * kMaxLevels]; // of each level, the children of one block wait, and the rest of one
+    uint32_t size = 0;
+    stack[size++] = {0, 1};
+    while (size > 0) {
+        Family& family = stack[size - 1];
+        const uint32_t first = family.first, count = std::min(family.left, kBlockLanes);
+        family.first += kBlockLanes, family.left -= count;
+        if (family.left == 0) --size;
+        tests_ += count;
+        const std::byte* const block = tree_.block(first / kBlockLanes);
+        const uint32_t held = probe.lanes(block);
+        for (uint32_t lane = 0; lane < count; ++lane) {
+            if ((held >> lane & 1) == 0) continue;
+            const uint32_t children = load_le<uint8_t>(block + kBlockCount + lane);
+            const auto begin = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
+            if (children < kTriangleLeaf) {
+                stack[size++] = {begin, children};
+                continue;
+            }
+            const uint32_t triangles = children - kTriangleLeaf;
+            tests_ += triangles;
+            for (uint32_t t = begin; t < begin + triangles; ++t) {
+                const Triangle corners = tree_.triangle(t);
+                if (std::ranges::find(corners, vertex) != corners.end()) visit(corners);
+            }
+        }
+    }
+}
+
+uint32_t Hills::step(uint32_t vertex, const dvec3& up) const noexcept {
+    const double from = height(vertex, up);
+    uint32_t top = vertex;
+    double most = from;
+    triangles_at(vertex, [&](const Triangle& corners) {
+        for (const uint32_t v : corners) {
+            if (v == vertex) continue;
+            const double h = height(v, up); // of equally high ones the first by index, whatever the tree's order
+            if (h > most || (h == most && h > from && v < top)) top = v, most = h;
+        }
+    });
+    return top;
+}
+
+uint32_t Hills::step(uint32_t first, uint32_t second, const dvec3& up) const noexcept {
+    uint32_t top = first;
+    double most = std::max(height(first, up), height(second, up));
+    triangles_at(first, [&](const Triangle& corners) {
+        if (std::ranges::find(corners, second) == corners.end()) return;
+        for (const uint32_t v : corners)
+            if (v != first && v != second && height(v, up) > most) top = v, most = height(v, up);
+    });
+    return top;
+}
+
+double Climb::step() noexcept {
+    const uint32_t from = vertex;
+    vertex = second != vertex ? hills->step(vertex, second, up) : hills->step(vertex, up);
+    second = vertex, --steps_left;
+    if (vertex == from) steps_left = 0;
+    return vertex == from ? 0 : hills->height(vertex, up) - hills->height(from, up);
+}
+
+} // namespace prolate::query

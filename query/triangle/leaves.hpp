@@ -1,0 +1,85 @@
+// Two leaves of exact trees: does a triangle of one meet a triangle of the other, and how far are they apart? Float
+// kernels answer for eight pairs at once; what they leave open the scalar tests of triangle.hpp and
+// triangle_distance.hpp decide.
+#pragma once
+
+#include "query/triangle/distance.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+namespace prolate::query {
+
+inline constexpr size_t kLanes = 8;
+
+/// What the float tests demand beyond zero (triangle_lanes-inl.hpp), in the lanes' unit: the greatest coordinate of a
+/// corner lies in [1/2, 1).
+struct LaneMargins {
+    float direction;    // of a separating direction n, times |n|_1
+    float corner_error; // a coordinate of a corner is wrong by no more
+    float distance;     // triangles are apart only if farther than this
+};
+/// Their parts that do not depend on the leaves. The tests give others, to show that wrong ones are caught.
+struct LaneMarginFactors {
+    float direction = 0x1p-18f; // 64 u, u = 2^-24
+    float volume = 0x1p-17f;    // 128 u
+};
+
+/// What the placement of corners in float costs, of the lanes' unit: 24 u.
+inline constexpr float kPlacementError = 0x1.8p-20f;
+
+/// A bit a lane. Neither: not known.
+struct LaneVerdicts {
+    uint32_t apart; // no common point, more than margins.distance apart
+    uint32_t meet;  // a common point
+};
+
+/// Triangles, one a lane: row 3 i + k is coordinate k of corner i.
+struct TriangleRows {
+    float row[9][kLanes];
+};
+
+struct LeafResult {
+    bool meet = false;                        // some two are not certainly more than `distance` apart
+    uint32_t triangle_a = 0, triangle_b = 0;  // the first such two
+    uint32_t pair_tests = 0, exact_tests = 0; // pairs up to these, and those of them that took the scalar test
+};
+/// Both trees have triangles, the ranges are not empty. Pairs are taken by fours of A's triangles, and for each by
+/// fours of B's; among these in the order of B's, and of A's for each. `distance` >= 0.
+LeafResult test_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                       const RelativePose& b_to_a, double distance = 0, const LaneMarginFactors& factors = {}) noexcept;
+
+struct LeafDistance {
+    double lower = std::numeric_limits<double>::infinity();                       // no two triangles are nearer
+    TriangleDistance nearest{0, std::numeric_limits<double>::infinity(), {}, {}}; // of the nearest two that were found
+    uint32_t triangle_a = 0, triangle_b = 0;                                      // these
+    uint32_t pair_tests = 0, exact_tests = 0;
+};
+/// Which pairs matter.
+struct NearLimit {
+    double distance = std::numeric_limits<double>::infinity(); // those that are nearer, metres,
+    double absolute = 0, relative = 0; // and than the nearest so far by this, or this share of its distance
+    void lower(double upper) { distance = std::min(distance, upper - std::max(absolute, relative * upper)); }
+};
+/// Pairs that do not matter may be left out: if all are, nearest.upper is infinite. Ends with the first pair whose
+/// lower bound is 0, which is then `nearest`. `normal`, a unit vector or 0, in A's frame: along it the triangles may
+/// well be apart.
+LeafDistance distance_of_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                                const RelativePose& b_to_a, NearLimit limit = {}, const glm::dvec3& normal = {0, 0, 0},
+                                const LaneMarginFactors& factors = {}) noexcept;
+
+/// In the lanes' unit, in which no two are farther apart than kFarLimit.
+struct TriangleBounds {
+    float lower[kLanes];
+};
+inline constexpr float kFarLimit = 16;
+
+/// The kernels alone, for the tests and benchmarks: a call a vector costs more than they do.
+LaneVerdicts test_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,
+                        const LaneMarginFactors& factors) noexcept;
+TriangleBounds bound_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,
+                           float limit) noexcept;
+
+} // namespace prolate::query

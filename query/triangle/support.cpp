@@ -1,0 +1,33 @@
+#include "query/triangle/support.hpp"
+#include "query/ellipsoid/separation.hpp"
+#include "src/bytes.hpp"
+#include "src/layout.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace prolate::query {
+namespace {
+
+template <class Index> double support(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) {
+    const std::byte* index = tree.triangle_bytes() + size_t{range.first} * 3 * sizeof(Index);
+    double most = -HUGE_VAL;
+    for (uint32_t i = 0; i < 3 * range.count; ++i, index += sizeof(Index)) {
+        const std::byte* const x = tree.vertex_bytes() + size_t{load_le<Index>(index)} * kVertexBytes;
+        const auto at = [x](size_t k) { return double{load_le<float>(x + k * sizeof(float))}; };
+        most = std::max(most, (n.x * at(0) + n.y * at(1)) + n.z * at(2));
+    }
+    return most;
+}
+
+} // namespace
+
+double support_of_corners(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) noexcept {
+    return tree.vertex_count() <= 0x10000 ? support<uint16_t>(tree, range, n) : support<uint32_t>(tree, range, n);
+}
+
+double reach_of_corners(const TreeView& tree) noexcept {
+    return place(tree.root()).reach;
+}
+
+} // namespace prolate::query

@@ -1,0 +1,66 @@
+#include "query/triangle/triangle.hpp"
+
+#include "query/ellipsoid/convert.hpp"
+#include "query/triangle/pair.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace prolate::query {
+
+using glm::dmat3;
+using glm::dvec3;
+
+PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept {
+    PlacedTriangle out{};
+    const Triangle corners = tree.triangle(triangle);
+    for (size_t i = 0; i < 3; ++i) {
+        out.corner[i] = to_double(tree.vertex(corners[i]));
+        out.reach = std::max(out.reach, glm::length(out.corner[i]));
+    }
+    return out;
+}
+
+PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose& b_to_a) noexcept {
+    PlacedTriangle out = place(tree, triangle);
+    for (dvec3& corner : out.corner) corner = b_to_a.rotation * corner + b_to_a.translation;
+    out.reach += b_to_a.distance;
+    return out;
+}
+
+bool apart(const PlacedTriangle& a, const PlacedTriangle& b, double distance, double margin) noexcept {
+    const TrianglePair pair(a, b);
+    const double bound = margin * (a.reach + b.reach) + distance;
+    return pair.any_direction([&](const dvec3& n) { // false for a NaN, and for zero
+        return pair.gap(n) > bound * glm::length(n);
+    });
+}
+
+bool apart(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid, double margin) noexcept {
+    const dmat3 to_ball = glm::inverse(ellipsoid.factor);
+    dvec3 p[3], y[3]; // corners from the center; the same where the ellipsoid is the unit ball
+    for (size_t i = 0; i < 3; ++i) {
+        p[i] = triangle.corner[i] - ellipsoid.center;
+        y[i] = to_ball * p[i];
+    }
+    const double bound = margin * (triangle.reach + ellipsoid.reach);
+    const auto separates = [&](const dvec3& direction) { // given where the ellipsoid is the unit ball
+        const dvec3 n = direction * to_ball;
+        const double x[3] = {glm::dot(n, p[0]), glm::dot(n, p[1]), glm::dot(n, p[2])};
+        const auto [low, high] = std::minmax({x[0], x[1], x[2]});
+        return std::max(low, -high) - glm::length(n * ellipsoid.factor) > bound * glm::length(n);
+    };
+    if (separates(glm::cross(y[1] - y[0], y[2] - y[0]))) return true;
+    for (size_t i = 0; i < 3; ++i) {
+        const dvec3 edge = y[(i + 1) % 3] - y[i];
+        const double square = glm::dot(edge, edge);
+        const double t = square > 0 ? std::clamp(-glm::dot(y[i], edge) / square, 0.0, 1.0) : 0;
+        if (separates(y[i] + t * edge)) return true;
+    }
+    return false;
+}
+
+} // namespace prolate::query
