@@ -1,8 +1,9 @@
-// prolate bake: from mesh files to .etree files. One asset (bake_asset.cpp), or all of a manifest (manifest.cpp).
-#include "cli/bake_asset.hpp"
+// prolate bake: from mesh files to .etree files. One asset (bake/asset.cpp), or all of a manifest
+// (bake/manifest.cpp).
+#include "cli/bake/asset.hpp"
+#include "cli/bake/manifest.hpp"
 #include "cli/common.hpp"
 #include "cli/levels.hpp"
-#include "cli/manifest.hpp"
 #include "cli/outputs.hpp"
 #include "cli/threads.hpp"
 

@@ -1,6 +1,6 @@
 // prolate export: the tree's ellipsoids for other programs.
 #include "cli/common.hpp"
-#include "cli/export_formats.hpp"
+#include "cli/export/formats.hpp"
 #include "cli/outputs.hpp"
 #include "cli/view_option.hpp"
 

@@ -3,7 +3,7 @@
 #include "cli/mesh_options.hpp"
 #include "cli/outputs.hpp"
 #include "cli/progress_line.hpp"
-#include "cli/render_sheet.hpp"
+#include "cli/render/sheet.hpp"
 #include "cli/threads.hpp"
 #include "cli/view_option.hpp"
 

@@ -4,9 +4,9 @@
 #include "cli/outputs.hpp"
 #include "cli/pose.hpp"
 #include "cli/progress_line.hpp"
-#include "cli/render_panel.hpp"
+#include "cli/render/panel.hpp"
 #include "cli/threads.hpp"
-#include "cli/view_scene.hpp"
+#include "cli/view/scene.hpp"
 
 #include <prolate/version.hpp>
 

@@ -1,7 +1,7 @@
 // The option --view of pictures: where the viewer stands.
 #pragma once
 
-#include "cli/render_panel.hpp"
+#include "cli/render/panel.hpp"
 
 #include <optional>
 #include <string>

@@ -35,7 +35,7 @@ function(prolate_library name)
   set_target_properties(prolate_${name} PROPERTIES EXPORT_NAME ${name})
   target_include_directories(prolate_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  # Sources name internal headers by folder: "src/symmetric3.hpp". tests/layering.cmake checks who may name whom.
+  # Sources name internal headers by folder: "src/symmetric3.hpp". tests/project/layering.cmake checks who may name whom.
   target_include_directories(prolate_${name} PRIVATE ${PROJECT_SOURCE_DIR})
   prolate_target(prolate_${name})
 endfunction()

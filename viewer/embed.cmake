@@ -1,6 +1,6 @@
 # cmake -D PAGE=<file> -D QUERY_MODULE=<file or nothing> -D OUTPUT=<.cpp> -P embed.cmake
 #
-# Writes the definitions of cli/view_assets.hpp: files as arrays of bytes.
+# Writes the definitions of cli/view/assets.hpp: files as arrays of bytes.
 cmake_minimum_required(VERSION 3.25)
 
 function(append_bytes text name file)
@@ -17,7 +17,7 @@ set(arrays "")
 append_bytes(arrays kPage "${PAGE}")
 append_bytes(arrays kQueryModule "${QUERY_MODULE}")
 file(WRITE "${OUTPUT}" "// Made by viewer/embed.cmake.
-#include \"cli/view_assets.hpp\"
+#include \"cli/view/assets.hpp\"
 
 namespace prolate::cli::assets {
 namespace {

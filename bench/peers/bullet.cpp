@@ -92,7 +92,7 @@ std::vector<std::vector<btVector3>> decompose(const Model& model, const std::str
             file << fmt::format("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
     }
     const std::string command = fmt::format("'{}' '{}' V-HACD {} 600 '{}' '{}' >/dev/null 2>&1", python,
-                                            PROLATE_BENCH_FOLDER "/decompose.py", kHulls, in, out);
+                                            PROLATE_BENCH_DECOMPOSE, kHulls, in, out);
     std::vector<std::vector<btVector3>> hulls;
     if (std::system(command.c_str()) == 0) {
         std::ifstream file(out);

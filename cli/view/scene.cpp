@@ -1,0 +1,128 @@
+#include "cli/view/scene.hpp"
+
+#include "cli/levels.hpp"
+#include "cli/render/palette.hpp"
+#include "cli/view/tables.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <glm/gtc/packing.hpp>
+
+namespace prolate::cli {
+namespace {
+
+constexpr uint32_t kLatticeNodes = 300'000;
+
+std::array<uint8_t, 3> srgb(const Oklch& colour) {
+    const glm::dvec3 linear = to_linear_rgb(colour);
+    std::array<uint8_t, 3> out{};
+    for (glm::length_t i = 0; i < 3; ++i)
+        out[static_cast<size_t>(i)] = static_cast<uint8_t>(std::lround(255 * srgb_encode(linear[i])));
+    return out;
+}
+
+// The tables of the nodes, one row each, in order of slots.
+nlohmann::ordered_json nodes_of(const TreeView& tree, NumberBlock& numbers) {
+    std::vector<uint32_t> slot;
+    std::vector<uint8_t> level, children, triangles, colour;
+    std::vector<float> ellipsoid, radii;
+    const std::vector<Oklch> colours = node_colours(tree);
+    for (uint32_t l = 0; l < tree.level_count(); ++l)
+        tree.for_each_node(l, [&](uint32_t node) {
+            const Ellipsoid e = tree.ellipsoid(node);
+            slot.push_back(node);
+            level.push_back(static_cast<uint8_t>(l));
+            children.push_back(static_cast<uint8_t>(tree.children(node).count));
+            triangles.push_back(static_cast<uint8_t>(tree.triangles(node).count));
+            for (const uint8_t channel : srgb(colours[node])) colour.push_back(channel);
+            ellipsoid.insert(ellipsoid.end(),
+                             {e.center.x, e.center.y, e.center.z, e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
+            for (const double radius : principal_axes(e).radii) radii.push_back(static_cast<float>(radius));
+        });
+    return {{"slot", numbers.add(slot)},         {"level", numbers.add(level)},
+            {"children", numbers.add(children)}, {"triangles", numbers.add(triangles)},
+            {"colour", numbers.add(colour)},     {"ellipsoid", numbers.add(ellipsoid)},
+            {"radii", numbers.add(radii)}};
+}
+
+nlohmann::ordered_json mesh_of(const Mesh& mesh, NumberBlock& numbers) {
+    std::vector<float> vertices;
+    for (const Vec3& v : mesh.vertices) vertices.insert(vertices.end(), {v.x, v.y, v.z});
+    nlohmann::ordered_json out{{"vertices", numbers.add(vertices)}};
+    const auto indices = [&]<class Index>(Index) {
+        std::vector<Index> list;
+        for (const Triangle& t : mesh.triangles)
+            for (const uint32_t corner : t) list.push_back(static_cast<Index>(corner));
+        return numbers.add(list);
+    };
+    out["triangles"] = mesh.vertices.size() <= 0x10000 ? indices(uint16_t{}) : indices(uint32_t{});
+    return out;
+}
+
+std::vector<float> to_floats(const std::vector<double>& values) {
+    std::vector<float> out(values.size());
+    std::transform(values.begin(), values.end(), out.begin(), [](double value) { return static_cast<float>(value); });
+    return out;
+}
+
+// Half floats, in percent of the diagonal: 0.05 % of each value is as good as a picture gets.
+nlohmann::ordered_json lattice_of(const DistanceLattice& lattice, double diagonal, NumberBlock& numbers) {
+    std::vector<uint16_t> halves;
+    for (const float distance : lattice.distance)
+        halves.push_back(glm::packHalf1x16(static_cast<float>(std::clamp(100 * distance / diagonal, -1e4, 1e4))));
+    return {{"origin", {lattice.origin.x, lattice.origin.y, lattice.origin.z}},
+            {"pitch", lattice.pitch},
+            {"size", lattice.size},
+            {"distance", numbers.add(halves)}};
+}
+
+} // namespace
+
+CleanMesh mesh_of(const TreeView& exact_tree) {
+    CleanMesh out;
+    for (uint32_t v = 0; v < exact_tree.vertex_count(); ++v) out.mesh.vertices.push_back(exact_tree.vertex(v));
+    for (uint32_t t = 0; t < exact_tree.triangle_count(); ++t) out.mesh.triangles.push_back(exact_tree.triangle(t));
+    out.report.closed = !exact_tree.surface_mode();
+    return out;
+}
+
+std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBlock& numbers, bool with_file,
+                                                const std::function<bool(double)>& progress) {
+    const TreeView& tree = body.tree;
+    const BakeInfo info = tree.bake_info();
+    nlohmann::ordered_json out{{"tree", body.tree_name},
+                               {"mesh_name", body.mesh_name},
+                               {"degree", tree.degree()},
+                               {"exact", info.exact},
+                               {"surface", info.surface_mode},
+                               {"proved", info.proved},
+                               {"covers", info.proved && (!body.mesh || body.own_mesh)},
+                               {"diagonal", info.diagonal},
+                               {"solid_volume", info.solid_volume}};
+    out["levels"] = nlohmann::ordered_json::array();
+    for (uint32_t l = 0; l < tree.level_count(); ++l) {
+        nlohmann::ordered_json level = level_json(tree, l);
+        level["cut"] = cut_size(tree, l);
+        out["levels"].push_back(std::move(level));
+    }
+    out["nodes"] = nodes_of(tree, numbers);
+    if (body.mesh) {
+        out["mesh"] = mesh_of(body.mesh->mesh, numbers);
+        out["mesh"]["closed"] = body.mesh->report.closed;
+        const Solid solid(body.mesh->mesh.view(), body.mesh->report.closed);
+        const auto lattice = distance_lattice(tree, *body.mesh, solid, kLatticeNodes, progress);
+        if (!lattice) return {};
+        if (info.diagonal > 0) out["lattice"] = lattice_of(*lattice, info.diagonal, numbers);
+        if (!info.exact) {
+            const NodeFigures figures = node_figures(tree, *body.mesh, solid, *lattice);
+            out["nodes"]["outside_volume"] = numbers.add(to_floats(figures.outside_volume));
+            out["nodes"]["sub_volume"] = numbers.add(to_floats(figures.sub_volume));
+        }
+    }
+    if (with_file) out["file"] = numbers.add(tree.bytes());
+    return out;
+}
+
+} // namespace prolate::cli

@@ -1,0 +1,31 @@
+// What the viewer's page is told: bodies, levels, nodes, meshes, colours. viewer/scene.js reads it.
+#pragma once
+
+#include "cli/view/page.hpp"
+
+#include <prolate/mesh.hpp>
+#include <prolate/tree.hpp>
+
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace prolate::cli {
+
+/// A tree with its mesh, if there is one. An exact tree brings its own.
+struct ViewBody {
+    std::string tree_name, mesh_name;
+    TreeView tree;
+    std::optional<CleanMesh> mesh;
+    bool own_mesh = true; ///< the mesh is the one that the tree was baked from
+};
+
+/// Describes one body, and puts its numbers into `numbers`. `with_file`: the bytes of the tree too, for queries.
+/// `progress`, called with the fraction done, may return false to stop; then there is no answer.
+std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBlock& numbers, bool with_file,
+                                                const std::function<bool(double)>& progress);
+
+/// The mesh that an exact tree holds.
+CleanMesh mesh_of(const TreeView& exact_tree);
+
+} // namespace prolate::cli

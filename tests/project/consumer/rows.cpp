@@ -1,0 +1,63 @@
+// Uses each header that README's table of questions names, as a user would: `rows TREE` asks each of them about a baked
+// solid of about a metre around the origin, and prints the headers whose answers are right.
+// tests/project/consumer.cmake compares them with the table.
+#include <prolate/bounds.hpp>
+#include <prolate/collide.hpp>
+#include <prolate/contacts.hpp>
+#include <prolate/distance.hpp>
+#include <prolate/jobs.hpp>
+#include <prolate/pairs.hpp>
+#include <prolate/raycast.hpp>
+#include <prolate/shapes.hpp>
+#include <prolate/sweep.hpp>
+#ifdef WITH_TBB
+#include <prolate/tbb.hpp>
+#endif
+#include <prolate/world.hpp>
+
+#include <cstdio>
+
+using namespace prolate;
+
+int main(int argc, char** argv) {
+    if (argc != 2) return std::fputs("usage: rows TREE\n", stderr), 2;
+    const auto loaded = load(argv[1]);
+    if (!loaded) return std::fprintf(stderr, "rows: %s\n", loaded.error().what), 1;
+    const TreeView tree = loaded->view();
+    const Pose here, near{{0.5f, 0, 0}, {}}, far{{10, 0, 0}, {}};
+    QueryContext context;
+    const auto row = [](const char* header, bool right) { std::printf("%s%s\n", header, right ? "" : ": wrong"); };
+
+    row("collide.hpp", collide(tree, here, tree, near, context).verdict == Verdict::overlapping);
+
+    const DistanceResult d = distance(tree, here, tree, far, context);
+    row("distance.hpp", d.lower > 1 && d.lower <= d.upper && d.upper < 10);
+
+    ContactManifolds manifolds;
+    contacts(tree, here, tree, near, manifolds, context);
+    row("contacts.hpp", manifolds.count > 0 && manifolds.manifolds[0].count > 0);
+
+    const SweepResult s = sweep(tree, {.start = here}, tree, {.start = far, .linear = {-10, 0, 0}}, context);
+    row("sweep.hpp", s.verdict == Verdict::overlapping && s.time_lower > 0 && s.time_upper < 1);
+
+    row("raycast.hpp", raycast(tree, here, {{-10, 0.1f, 0.1f}, {1, 0, 0}}, context).verdict == Verdict::overlapping);
+
+    row("shapes.hpp", overlap(tree, here, Sphere{{0, 0, 0}, 1}, context).verdict == Verdict::overlapping &&
+                          overlap(tree, far, HalfSpace{{1, 0, 0}, 0}, context).verdict == Verdict::separated);
+
+    row("pairs.hpp", collide(tree.root(), here, tree.root(), far) == Verdict::separated);
+
+    const Bounds box = bounds(tree, far);
+    row("bounds.hpp", box.lower.x > 5 && box.upper.x < 15);
+
+    auto world = World::create();
+    const bool inserted = world && world->insert({.tree = tree, .pose = here}) &&
+                          world->insert({.tree = tree, .pose = near}) && world->insert({.tree = tree, .pose = far});
+    row("world.hpp", inserted && world->update_pairs()->size() == 1);
+    row("jobs.hpp", inserted && world->update_pairs(Jobs{})->size() == 1);
+#ifdef WITH_TBB
+    oneapi::tbb::task_arena arena(2);
+    row("tbb.hpp", inserted && world->update_pairs(tbb_jobs(arena))->size() == 1);
+#endif
+    return 0;
+}
