@@ -2,7 +2,8 @@
 // (bake/manifest.cpp).
 #include "cli/bake/asset.hpp"
 #include "cli/bake/manifest.hpp"
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
 #include "cli/levels.hpp"
 #include "cli/outputs.hpp"
 #include "cli/threads.hpp"
@@ -67,16 +68,15 @@ struct BakeArguments {
     std::vector<const CLI::Option*> asset_options;
 };
 
-int run_one(BakeArguments& a) {
-    if (a.asset.mesh.empty()) return complain(kUsage, "bake", "no mesh is given", "see 'prolate bake --help'");
-    if (a.asset.output.empty()) return complain(kUsage, "bake", "--output is required", "see 'prolate bake --help'");
+Outcome<ExitCode> run_one(BakeArguments& a) {
+    if (a.asset.mesh.empty()) return Failure{kUsage, "bake", "no mesh is given", "see 'prolate bake --help'"};
+    if (a.asset.output.empty()) return Failure{kUsage, "bake", "--output is required", "see 'prolate bake --help'"};
     name_inputs(a.asset, a.outputs);
     a.outputs.reads(a.cache, "the cache folder");
-    int code = claim_outputs(a.asset, a.outputs);
-    if (code != kDone) return code;
+    if (const auto claimed = claim_outputs(a.asset, a.outputs); !claimed) return claimed.error();
     BakeCache cache(a.cache);
-    const auto baked = bake_asset(a.asset, a.outputs, cache, a.rebake, "", code);
-    if (!baked) return code;
+    const auto baked = bake_asset(a.asset, a.outputs, cache, a.rebake, "");
+    if (!baked) return baked.error();
     if (baked->source == Source::unchanged)
         note(a.asset.output, "unchanged: made from this mesh with these options (--rebake bakes anew)");
     if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--rebake bakes anew)");
@@ -90,13 +90,13 @@ int run_one(BakeArguments& a) {
     return kDone;
 }
 
-int run(BakeArguments& a) {
+Outcome<ExitCode> run(BakeArguments& a) {
     use_available_threads();
     if (a.manifest.empty()) return run_one(a);
     const std::string report = a.asset.report;
     for (const CLI::Option* option : a.asset_options)
         if (option->count() > 0)
-            return complain(kUsage, option->get_name(), "does not go with --manifest", "say it in the manifest");
+            return Failure{kUsage, option->get_name(), "does not go with --manifest", "say it in the manifest"};
     BakeCache cache(a.cache);
     a.outputs.reads(a.cache, "the cache folder");
     return bake_manifest(a.manifest, a.outputs, cache, {a.rebake, a.json, a.asset.options.threads, report});

@@ -1,5 +1,8 @@
 // prolate collide: one query between two trees, for trying out and for scripts.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
+#include "cli/grouped.hpp"
+#include "cli/inputs.hpp"
 #include "cli/pose.hpp"
 
 #include <prolate/collide.hpp>
@@ -39,7 +42,7 @@ struct CollideArguments {
 };
 
 constexpr const char* kVerdicts[] = {"separated", "overlapping", "undecided"}; // by Verdict
-constexpr int kVerdictCodes[] = {kDone, kNo, kUnknown};
+constexpr ExitCode kVerdictCodes[] = {kDone, kNo, kUnknown};
 
 uint32_t level_of(const TreeView& tree, uint32_t node) {
     uint32_t level = 0;
@@ -69,62 +72,72 @@ std::string distance_text(const DistanceResult& distance) {
                        point(distance.point_a), point(distance.point_b));
 }
 
-int run(const CollideArguments& a) {
+// Both answers to the one question.
+struct Answer {
+    CollideResult collide;
+    DistanceResult distance;
+};
+
+std::string as_json(const Answer& answer) {
+    using Json = nlohmann::ordered_json;
+    const CollideResult& result = answer.collide;
+    const bool meet = result.verdict == Verdict::overlapping;
+    const auto triangle = [](uint32_t t) { return t == kNoTriangle ? nullptr : Json(t); };
+    Json out;
+    out["verdict"] = kVerdicts[static_cast<size_t>(result.verdict)];
+    out["node_a"] = meet ? Json(result.pair.node_a) : nullptr;
+    out["node_b"] = meet ? Json(result.pair.node_b) : nullptr;
+    out["triangle_a"] = triangle(result.pair.triangle_a);
+    out["triangle_b"] = triangle(result.pair.triangle_b);
+    out["distance"] = distance_json(answer.distance);
+    out["enclosed"] = result.enclosed;
+    out["pair_tests"] = result.stats.pair_tests;
+    out["block_tests"] = result.stats.block_tests;
+    out["triangle_tests"] = result.stats.triangle_tests;
+    out["deepest_level"] = result.stats.deepest_level;
+    return out.dump(2) + '\n';
+}
+
+std::string as_text(const Answer& answer, const TreeView& tree_a, const TreeView& tree_b) {
+    const CollideResult& result = answer.collide;
+    const auto part = [](const TreeView& tree, uint32_t node, uint32_t triangle, char body) {
+        return triangle == kNoTriangle ? fmt::format("node {} of {} (level {})", node, body, level_of(tree, node))
+                                       : fmt::format("triangle {} of {}", triangle, body);
+    };
+    std::string out = kVerdicts[static_cast<size_t>(result.verdict)];
+    if (result.verdict == Verdict::overlapping)
+        out += result.enclosed
+                   ? ": a part of one lies inside the other"
+                   : fmt::format(": {} and {} meet", part(tree_a, result.pair.node_a, result.pair.triangle_a, 'A'),
+                                 part(tree_b, result.pair.node_b, result.pair.triangle_b, 'B'));
+    return out + '\n' + distance_text(answer.distance) +
+           fmt::format("{} pair tests, {} block tests, {} triangle tests, deepest level {}\n",
+                       grouped(result.stats.pair_tests), grouped(result.stats.block_tests),
+                       grouped(result.stats.triangle_tests), result.stats.deepest_level);
+}
+
+Outcome<ExitCode> run(const CollideArguments& a) {
     const auto pose = parse_pose(a.pose);
-    if (!pose) return complain_of_pose();
-    int code = kDone;
-    const auto tree_a = read_tree(a.tree_a, code);
-    if (!tree_a) return code;
-    const auto tree_b = read_tree(a.tree_b, code);
-    if (!tree_b) return code;
-    if (const uint32_t levels = std::max(tree_a->view().level_count(), tree_b->view().level_count());
-        a.level && *a.level >= levels)
-        return complain(kUsage, "--level", fmt::format("neither tree has a level {}", *a.level),
-                        fmt::format("their levels are 0 to {}", levels - 1));
+    if (!pose) return pose.error();
+    const auto file_a = read_tree(a.tree_a);
+    if (!file_a) return file_a.error();
+    const auto file_b = read_tree(a.tree_b);
+    if (!file_b) return file_b.error();
+    const TreeView tree_a = file_a->view(), tree_b = file_b->view();
+    if (const uint32_t levels = std::max(tree_a.level_count(), tree_b.level_count()); a.level && *a.level >= levels)
+        return Failure{kUsage, "--level", fmt::format("neither tree has a level {}", *a.level),
+                       fmt::format("their levels are 0 to {}", levels - 1)};
     QueryOptions options;
     options.max_level = a.level.value_or(options.max_level);
     options.max_pair_tests = a.budget.value_or(options.max_pair_tests);
-    QueryContext context;
-    const CollideResult result = collide(tree_a->view(), Pose{}, tree_b->view(), *pose, context, options);
-    const char* verdict = kVerdicts[static_cast<size_t>(result.verdict)];
-    const bool meet = result.verdict == Verdict::overlapping;
     DistanceOptions distance_options;
     distance_options.max_level = options.max_level;
     distance_options.max_pair_tests = options.max_pair_tests;
-    const DistanceResult apart = distance(tree_a->view(), Pose{}, tree_b->view(), *pose, context, distance_options);
-    const int code_of_verdict = a.exit_code ? kVerdictCodes[static_cast<size_t>(result.verdict)] : kDone;
-    if (a.json) {
-        nlohmann::ordered_json out;
-        out["verdict"] = verdict;
-        out["node_a"] = meet ? nlohmann::ordered_json(result.pair.node_a) : nullptr;
-        out["node_b"] = meet ? nlohmann::ordered_json(result.pair.node_b) : nullptr;
-        const auto triangle = [](uint32_t t) { return t == kNoTriangle ? nullptr : nlohmann::ordered_json(t); };
-        out["triangle_a"] = triangle(result.pair.triangle_a);
-        out["triangle_b"] = triangle(result.pair.triangle_b);
-        out["distance"] = distance_json(apart);
-        out["enclosed"] = result.enclosed;
-        out["pair_tests"] = result.stats.pair_tests;
-        out["block_tests"] = result.stats.block_tests;
-        out["triangle_tests"] = result.stats.triangle_tests;
-        out["deepest_level"] = result.stats.deepest_level;
-        print(out.dump(2) + '\n');
-        return code_of_verdict;
-    }
-    const auto part = [](const Tree& tree, uint32_t node, uint32_t triangle, char body) {
-        return triangle == kNoTriangle
-                   ? fmt::format("node {} of {} (level {})", node, body, level_of(tree.view(), node))
-                   : fmt::format("triangle {} of {}", triangle, body);
-    };
-    print(!meet             ? fmt::format("{}\n", verdict)
-          : result.enclosed ? fmt::format("{}: a part of one lies inside the other\n", verdict)
-                            : fmt::format("{}: {} and {} meet\n", verdict,
-                                          part(*tree_a, result.pair.node_a, result.pair.triangle_a, 'A'),
-                                          part(*tree_b, result.pair.node_b, result.pair.triangle_b, 'B')));
-    print(distance_text(apart));
-    print(fmt::format("{} pair tests, {} block tests, {} triangle tests, deepest level {}\n",
-                      grouped(result.stats.pair_tests), grouped(result.stats.block_tests),
-                      grouped(result.stats.triangle_tests), result.stats.deepest_level));
-    return code_of_verdict;
+    QueryContext context;
+    const Answer answer{collide(tree_a, Pose{}, tree_b, *pose, context, options),
+                        distance(tree_a, Pose{}, tree_b, *pose, context, distance_options)};
+    print(a.json ? as_json(answer) : as_text(answer, tree_a, tree_b));
+    return a.exit_code ? kVerdictCodes[static_cast<size_t>(answer.collide.verdict)] : kDone;
 }
 
 } // namespace

@@ -1,6 +1,7 @@
 // prolate completion, prolate man: what the command line is, told to shells and to man(1), from the parser's own
 // description of itself.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
 #include "cli/generator.hpp"
 
 #include <CLI/CLI.hpp>

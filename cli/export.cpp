@@ -1,8 +1,10 @@
 // prolate export: the tree's ellipsoids for other programs.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
 #include "cli/export/formats.hpp"
+#include "cli/inputs.hpp"
 #include "cli/outputs.hpp"
 #include "cli/view_option.hpp"
+#include "cli/words.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -82,7 +84,9 @@ Selection cut_at(const TreeView& tree, uint32_t level) {
     return out;
 }
 
-std::string picture(const TreeView& tree, std::string_view format, const ExportArguments& a, const View& view) {
+std::string content(const TreeView& tree, std::string_view format, const ExportArguments& a, const View& view) {
+    if (format == "csv") return as_csv(tree, a.level ? cut_at(tree, *a.level) : all_cuts(tree));
+    if (format == "json") return as_json(tree, a.level ? cut_at(tree, *a.level) : all_nodes(tree));
     const std::vector<Piece> pieces = pieces_of(tree, a.level.value_or(tree.level_count() - 1));
     const Facets facets = a.outer.value_or(format != "glb") ? Facets::outer : Facets::inscribed;
     if (format == "ply") return as_ply(pieces, a.segments, facets);
@@ -91,28 +95,25 @@ std::string picture(const TreeView& tree, std::string_view format, const ExportA
     return as_pov(pieces, view);
 }
 
-int run(ExportArguments& a) {
+Outcome<ExitCode> run(ExportArguments& a) {
     const std::string format = a.format.empty() ? extension(a.output) : a.format;
     if (std::find(std::begin(kFormats), std::end(kFormats), format) == std::end(kFormats))
-        return complain(kUsage, format.empty() ? a.output : format,
-                        format.empty() ? "the format is not clear from the name" : "no such export format",
-                        "use csv, json, ply, obj, glb or pov, as the extension or with --format");
-    int code = kDone;
-    const auto viewer = view_of(a.view, code);
-    if (!viewer) return code;
+        return Failure{kUsage, format.empty() ? a.output : format,
+                       format.empty() ? "the format is not clear from the name" : "no such export format",
+                       "use csv, json, ply, obj, glb or pov, as the extension or with --format"};
+    const auto viewer = view_of(a.view);
+    if (!viewer) return viewer.error();
     a.outputs.reads(a.tree, "the tree");
-    if (code = a.outputs.claim(a.output, "the output", format); code != kDone) return code;
-    const auto tree = read_tree(a.tree, code);
-    if (!tree) return code;
+    if (const auto claimed = a.outputs.claim(a.output, "the output", format); !claimed) return claimed.error();
+    const auto tree = read_tree(a.tree);
+    if (!tree) return tree.error();
     const TreeView view = tree->view();
     if (a.level && *a.level >= view.level_count())
-        return complain(kUsage, "--level", fmt::format("the tree has no level {}", *a.level),
-                        fmt::format("its levels are 0 to {}", view.level_count() - 1));
-    if (format == "csv")
-        return a.outputs.write(a.output, as_csv(view, a.level ? cut_at(view, *a.level) : all_cuts(view)));
-    if (format == "json")
-        return a.outputs.write(a.output, as_json(view, a.level ? cut_at(view, *a.level) : all_nodes(view)));
-    return a.outputs.write(a.output, picture(view, format, a, *viewer));
+        return Failure{kUsage, "--level", fmt::format("the tree has no level {}", *a.level),
+                       fmt::format("its levels are 0 to {}", view.level_count() - 1)};
+    const auto written = a.outputs.write(a.output, content(view, format, a, *viewer));
+    if (!written) return written.error();
+    return kDone;
 }
 
 } // namespace

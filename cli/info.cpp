@@ -1,6 +1,10 @@
 // prolate info: what an .etree file holds and how it was made.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
+#include "cli/grouped.hpp"
+#include "cli/inputs.hpp"
 #include "cli/levels.hpp"
+#include "cli/words.hpp"
 
 #include <prolate/version.hpp>
 
@@ -84,10 +88,9 @@ std::string as_text(const std::string& name, const TreeView& tree) {
     return out;
 }
 
-int run(const InfoArguments& a) {
-    int code = kDone;
-    const auto tree = read_tree(a.tree, code);
-    if (!tree) return code;
+Outcome<ExitCode> run(const InfoArguments& a) {
+    const auto tree = read_tree(a.tree);
+    if (!tree) return tree.error();
     print(a.json ? as_json(tree->view()) : as_text(a.tree, tree->view()));
     return kDone;
 }

@@ -1,7 +1,9 @@
-// prolate: the command line. Parses, then runs one command; exit codes are in common.hpp.
-#include "cli/common.hpp"
+// prolate: the command line. Parses, then runs one command; exit codes are in failure.hpp.
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
 #include "cli/generator.hpp"
 #include "cli/signals.hpp"
+#include "cli/words.hpp"
 
 #include <prolate/version.hpp>
 
@@ -38,26 +40,26 @@ std::string hint(std::string_view word, const std::vector<std::string>& known, c
 }
 
 // Looks for unknown words first: the parser would rather complain of something that is missing because of them.
-int check_words(const CLI::App& app, const std::vector<std::string>& words) {
-    if (words.empty()) return complain(kUsage, "usage", "no command given", "see 'prolate --help'");
-    if (words[0].starts_with('-')) return kDone;
+Outcome<> check_words(const CLI::App& app, const std::vector<std::string>& words) {
+    if (words.empty()) return Failure{kUsage, "usage", "no command given", "see 'prolate --help'"};
+    if (words[0].starts_with('-')) return kSuccess;
     std::vector<std::string> known;
     const CLI::App* command = nullptr;
     for (const CLI::App* one : app.get_subcommands([](const CLI::App*) { return true; })) {
         known.push_back(one->get_name());
         if (one->get_name() == words[0]) command = one;
     }
-    if (!command) return complain(kUsage, words[0], "no such command", hint(words[0], known, "see 'prolate --help'"));
+    if (!command) return Failure{kUsage, words[0], "no such command", hint(words[0], known, "see 'prolate --help'")};
     known.clear();
     for (const CLI::Option* option : command->get_options())
         for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
     for (size_t i = 1; i < words.size() && words[i] != "--"; ++i) {
         const std::string word = words[i].substr(0, words[i].find('='));
         if (word.starts_with("--") && std::find(known.begin(), known.end(), word) == known.end())
-            return complain(kUsage, word, "no such option",
-                            hint(word, known, fmt::format("see 'prolate {} --help'", words[0])));
+            return Failure{kUsage, word, "no such option",
+                           hint(word, known, fmt::format("see 'prolate {} --help'", words[0]))};
     }
-    return kDone;
+    return kSuccess;
 }
 
 // A whole number, of digits only: the parser would take "" for 0 and -1 for 2^64 - 1.
@@ -82,7 +84,7 @@ void complete(CLI::App& app) {
     }
 }
 
-int run(std::vector<std::string> words) {
+Outcome<ExitCode> run(std::vector<std::string> words) {
     CLI::App app("prolate: collision detection on ellipsoid trees", "prolate");
     app.set_version_flag("--version", fmt::format("{} (.etree format {})", generator(), kFormatVersion));
     app.footer(kFooter);
@@ -103,17 +105,20 @@ int run(std::vector<std::string> words) {
         words.resize(std::min<size_t>(words.size(), 1));
         words.push_back("--help");
     }
-    if (const int code = check_words(app, words); code != kDone) return code;
+    if (const auto known = check_words(app, words); !known) return known.error();
     const std::string name = words[0];
     try {
         std::reverse(words.begin(), words.end()); // as CLI11 wants it
         app.parse(words);
     } catch (const CLI::ParseError& e) {
-        if (e.get_exit_code() == 0) return app.exit(e); // --help, --version
+        if (e.get_exit_code() == 0) { // --help, --version
+            app.exit(e);
+            return kDone;
+        }
         const auto used = app.get_subcommands();
         const std::string command = used.empty() ? "" : used[0]->get_name() + " ";
-        return complain(kUsage, used.empty() ? "usage" : used[0]->get_name(), e.what(),
-                        fmt::format("see 'prolate {}--help'", command));
+        return Failure{kUsage, used.empty() ? "usage" : used[0]->get_name(), e.what(),
+                       fmt::format("see 'prolate {}--help'", command)};
     }
     catch_signals(name.c_str());
     return chosen();
@@ -126,9 +131,6 @@ int main(int argc, char** argv) {
     using namespace prolate::cli;
     const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
     if (std::find(words.begin(), std::find(words.begin(), words.end(), "--"), "--json") != words.end())
-        report_errors_as_json();
-    const int code = guarded([&words] { return run(words); });
-    finish_with_json(code);
-    const int finished = finish_output(code);
-    return finished == kInterrupted && interrupted() ? 128 + interrupted() : finished;
+        errors_as_json();
+    return finish(guarded([&words] { return run(words); }));
 }

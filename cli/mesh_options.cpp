@@ -1,6 +1,8 @@
 #include "cli/mesh_options.hpp"
 
-#include "cli/common.hpp"
+#include "cli/console.hpp"
+#include "cli/grouped.hpp"
+#include "cli/inputs.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -33,8 +35,7 @@ void declare_mesh_options(CLI::App& app, MeshOptions& options, bool tree) {
     app.add_flag("--recentre", options.recentre, "take a mesh far from (0, 0, 0) around a local origin" + unless);
 }
 
-std::optional<ImportOptions> import_options(const MeshOptions& options, int& code,
-                                            const std::optional<Placement>& placement) {
+Outcome<ImportOptions> import_options(const MeshOptions& options, const std::optional<Placement>& placement) {
     const bool says_nothing = options.unit.empty() && options.scale.empty() && !options.recentre;
     if (placement && says_nothing) return placed_as(*placement);
     ImportOptions out;
@@ -42,15 +43,24 @@ std::optional<ImportOptions> import_options(const MeshOptions& options, int& cod
     if (const auto unit = std::find_if(std::begin(kUnits), std::end(kUnits), named); unit != std::end(kUnits))
         out.unit = unit->second;
     const auto sound = [](double s) { return std::isfinite(s) && s != 0; };
-    if (options.scale.size() == 2 || !std::all_of(options.scale.begin(), options.scale.end(), sound)) {
-        code =
-            complain(kUsage, "--scale", "must be one number or three, none of them 0", "write it as 0.001 or 1,1,-1");
-        return {};
-    }
+    if (options.scale.size() == 2 || !std::all_of(options.scale.begin(), options.scale.end(), sound))
+        return Failure{kUsage, "--scale", "must be one number or three, none of them 0", "write it as 0.001 or 1,1,-1"};
     for (size_t k = 0; k < 3 && !options.scale.empty(); ++k)
         out.scale[k] = options.scale[options.scale.size() == 3 ? k : 0];
     out.recentre = options.recentre;
     return out;
+}
+
+Outcome<MeshOfTree> read_mesh_of(const TreeView& tree, const std::string& path, const MeshOptions& options) {
+    const BakeInfo info = tree.bake_info();
+    const auto import = import_options(options, info.placement);
+    if (!import) return import.error();
+    auto mesh = read_mesh(path, *import);
+    if (!mesh) return mesh.error();
+    auto cleaned = clean(mesh->view(), info.weld);
+    if (!cleaned) return failure_of(path, cleaned.error());
+    const bool own = hash(cleaned->mesh.view()) == info.source_hash;
+    return MeshOfTree{std::move(*mesh), std::move(*cleaned), own};
 }
 
 std::string size_text(const MeshReport& report) {

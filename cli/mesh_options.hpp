@@ -1,7 +1,10 @@
 // How a command takes its mesh from the file: the options for it, and what it says of the mesh.
 #pragma once
 
+#include "cli/failure.hpp"
+
 #include <prolate/mesh.hpp>
+#include <prolate/tree.hpp>
 
 #include <optional>
 #include <string>
@@ -25,10 +28,18 @@ struct MeshOptions {
 /// tree says what these do not.
 void declare_mesh_options(CLI::App& app, MeshOptions& options, bool tree = false);
 
-/// The options as the library takes them, or those of the tree's `placement`, if they say nothing; or a complaint, and
-/// `code`.
-std::optional<ImportOptions> import_options(const MeshOptions& options, int& code,
-                                            const std::optional<Placement>& placement = {});
+/// The options as the library takes them, or those of the tree's `placement`, if they say nothing.
+Outcome<ImportOptions> import_options(const MeshOptions& options, const std::optional<Placement>& placement = {});
+
+/// The mesh beside a tree.
+struct MeshOfTree {
+    Mesh as_read;
+    CleanMesh cleaned;
+    bool own; ///< it is the one that the tree was baked from
+};
+
+/// Reads the mesh as it was read when the tree was baked, unless `options` say otherwise.
+Outcome<MeshOfTree> read_mesh_of(const TreeView& tree, const std::string& path, const MeshOptions& options);
 
 /// What the user should know of the mesh, a line each on stderr.
 void describe_mesh(const std::string& path, const MeshReport& report);

@@ -1,6 +1,8 @@
 #include "cli/outputs.hpp"
 
-#include "cli/common.hpp"
+#include "cli/console.hpp"
+#include "cli/inputs.hpp"
+#include "cli/mesh_files.hpp"
 #include "cli/signals.hpp"
 
 #include "src/can_save.hpp"
@@ -105,63 +107,65 @@ void Outputs::reads(const std::string& path, const std::string& role) {
     if (const std::string file = identity(path); !file.empty()) users_.emplace(file, User{role, path});
 }
 
-int Outputs::claim(const std::string& path, const std::string& role, std::string_view kind) {
-    if (path.empty()) return kDone;
+void Outputs::reads_mesh(const std::string& path, const std::string& role) {
+    reads(path, role);
+    for (const std::string& other : files_beside(path)) reads(other, "read with " + role);
+}
+
+Outcome<> Outputs::claim(const std::string& path, const std::string& role, std::string_view kind) {
+    if (path.empty()) return kSuccess;
     if (const std::string file = identity(path); !file.empty()) {
         const auto [user, added] = users_.emplace(file, User{role, path});
         if (!added)
-            return complain(kUsage, path,
-                            user->second.path == path
-                                ? fmt::format("is {}", user->second.role)
-                                : fmt::format("is the same file as {}, {}", user->second.role, user->second.path),
-                            fmt::format("name another file for {}", role));
+            return Failure{kUsage, path,
+                           user->second.path == path
+                               ? fmt::format("is {}", user->second.role)
+                               : fmt::format("is the same file as {}, {}", user->second.role, user->second.path),
+                           fmt::format("name another file for {}", role)};
     }
     claims_.emplace(path, kind);
     if (is_standard_output(path)) {
         take_standard_output();
-        return kDone;
+        return kSuccess;
     }
     std::error_code none;
     const fs::path parent = fs::path(path).parent_path();
     const std::string folder = parent.empty() ? "." : parent.string();
     if (!fs::exists(path, none) && !fs::is_directory(folder, none))
-        return complain(kIo, path, fmt::format("the folder {} does not exist", folder), "create it first");
-    if (const int code = check_content(path, kind); code != kDone) return code;
-    if (const auto can = can_save(path.c_str()); !can) return complain(path, can.error());
-    return kDone;
+        return Failure{kIo, path, fmt::format("the folder {} does not exist", folder), "create it first"};
+    if (const auto mine = check_content(path, kind); !mine) return mine;
+    if (const auto can = can_save(path.c_str()); !can) return failure_of(path, can.error());
+    return kSuccess;
 }
 
-int Outputs::check_content(const std::string& path, std::string_view kind) const {
+Outcome<> Outputs::check_content(const std::string& path, std::string_view kind) const {
     std::error_code none;
-    if (force_ || !fs::is_regular_file(path, none) || fs::file_size(path, none) == 0) return kDone;
+    if (force_ || !fs::is_regular_file(path, none) || fs::file_size(path, none) == 0) return kSuccess;
     const auto head = read_file(path, kMarkReach);
-    if (head && is_ours(kind, *head)) return kDone;
-    return complain(kIo, path,
-                    head ? fmt::format("is there already, and no .{} file of prolate's", kind)
-                         : fmt::format("is there already, and its content cannot be read"),
-                    "name another file, or replace it with --force");
+    if (head && is_ours(kind, *head)) return kSuccess;
+    return Failure{kIo, path,
+                   head ? fmt::format("is there already, and no .{} file of prolate's", kind)
+                        : "is there already, and its content cannot be read",
+                   "name another file, or replace it with --force"};
 }
 
-int Outputs::write(const std::string& path, std::span<const std::byte> content, Effort effort) const {
-    if (path.empty()) return kDone;
+Outcome<> Outputs::write(const std::string& path, std::span<const std::byte> content, Effort effort) const {
+    if (path.empty()) return kSuccess;
     const GracefulStop whole; // once begun, it is finished
-    if (interrupted() && effort != Effort::account) return complain(path, Error{ErrorCode::cancelled});
-    const std::string_view kind = claims_.at(path);
-    int code = kDone;
+    if (interrupted() && effort != Effort::account) return failure_of(path, Error{ErrorCode::cancelled});
+    Outcome<> written = kSuccess;
     if (is_standard_output(path)) {
         print({reinterpret_cast<const char*>(content.data()), content.size()});
-        if (effort != Effort::long_) return kDone; // finish_output() reports
-        if (const int error = flush_output(); error != 0) code = complain_of_output(error);
-    } else if (code = check_content(path, kind); code == kDone) { // the work took its time
-        if (const auto saved = save(path.c_str(), content); !saved) code = complain(path, saved.error());
+        if (effort == Effort::long_) written = flush_output();             // else finish() reports
+    } else if (written = check_content(path, claims_.at(path)); written) { // the work took its time
+        if (const auto saved = save(path.c_str(), content); !saved) written = failure_of(path, saved.error());
     }
-    if (code != kDone && effort == Effort::long_)
-        if (const std::string kept = keep_elsewhere(path, content); !kept.empty())
-            note(path, fmt::format("what was made is kept as {}", kept));
-    return code;
+    if (written || effort != Effort::long_) return written;
+    const std::string kept = keep_elsewhere(path, content);
+    return kept.empty() ? written.error() : advised(written.error(), "what was made is kept as " + kept);
 }
 
-int Outputs::write(const std::string& path, std::string_view content, Effort effort) const {
+Outcome<> Outputs::write(const std::string& path, std::string_view content, Effort effort) const {
     return write(path, std::as_bytes(std::span(content.data(), content.size())), effort);
 }
 

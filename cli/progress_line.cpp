@@ -1,6 +1,8 @@
 #include "cli/progress_line.hpp"
 
-#include "cli/common.hpp"
+#include "cli/console.hpp"
+#include "cli/grouped.hpp"
+#include "cli/words.hpp"
 
 #include <fmt/format.h>
 
@@ -65,7 +67,7 @@ bool ProgressLine::show(std::string_view stage, double fraction, uint32_t nodes)
         const std::string text = fmt::format("{:<12} {:3.0f} %{}  {:.0f} s{}", stage, 100 * fraction, count, seconds,
                                              left ? fmt::format(", about {} left", rounded_time(*left)) : "");
         // A line that fills the last column wraps on some terminals.
-        const size_t width = std::max<size_t>(terminal_width(), 2) - 1;
+        const size_t width = terminal_width() - 1;
         const std::string label = text.size() < width ? fitted(label_, width - text.size()) : "";
         fmt::print(stderr, "\r\x1b[K{}", fitted(label + text, width));
         std::fflush(stderr);

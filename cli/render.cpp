@@ -1,11 +1,14 @@
 // prolate render: a picture of a tree, level by level.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
+#include "cli/inputs.hpp"
 #include "cli/mesh_options.hpp"
 #include "cli/outputs.hpp"
 #include "cli/progress_line.hpp"
 #include "cli/render/sheet.hpp"
 #include "cli/threads.hpp"
 #include "cli/view_option.hpp"
+#include "cli/words.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -72,68 +75,69 @@ template <size_t kCount> CLI::IsMember one_of(const char* const (&words)[kCount]
     return CLI::IsMember(std::vector<std::string>(std::begin(words), std::end(words)));
 }
 
-int run(RenderArguments& a) {
-    use_available_threads();
-    SheetOptions options;
-    if (!parse_size(a.size, options.width, options.height))
-        return complain(kUsage, "--size", "not a size in pixels", "write it as 1600x1200");
-    if (const std::string kind = extension(a.output); !kind.empty() && kind != "png")
-        return complain(kUsage, a.output, "render writes PNG files only", "end the name in .png");
-    if (!parse_section(a.section, options.section))
-        return complain(kUsage, "--section", "not a plane across an axis",
-                        "write it as x, y or z, or with a part of the extent, as z,0.4");
-    options.heat = a.heat || a.heat_top > 0;
-    options.heat_top = a.heat_top;
-    if (a.mesh.empty() && (options.heat || a.mesh_style == "overlay"))
-        return complain(kUsage, options.heat ? "--heat" : "--mesh overlay", "there is no mesh",
-                        "name the mesh after the tree");
-    if (options.heat && a.mesh_style == "overlay")
-        return complain(kUsage, "--heat", "colours cannot be told when the mesh shines through",
-                        "leave out --mesh overlay, or try --section");
-    int code = kDone;
-    const auto viewer = view_of(a.view, code);
-    if (!viewer) return code;
-    a.outputs.reads(a.tree, "the tree");
-    a.outputs.reads(a.mesh, "the mesh");
-    if (code = a.outputs.claim(a.output, "the picture", "png"); code != kDone) return code;
-    const auto tree = read_tree(a.tree, code);
-    if (!tree) return code;
-    const TreeView view = tree->view();
+// All that the command line says of the picture; its levels, if none are given, are the tree's to say.
+Outcome<SheetOptions> sheet_options(const RenderArguments& a) {
+    SheetOptions out;
+    if (!parse_size(a.size, out.width, out.height))
+        return Failure{kUsage, "--size", "not a size in pixels", "write it as 1600x1200"};
+    if (!parse_section(a.section, out.section))
+        return Failure{kUsage, "--section", "not a plane across an axis",
+                       "write it as x, y or z, or with a part of the extent, as z,0.4"};
+    out.heat = a.heat || a.heat_top > 0;
+    out.heat_top = a.heat_top;
+    if (a.mesh.empty() && (out.heat || a.mesh_style == "overlay"))
+        return Failure{kUsage, out.heat ? "--heat" : "--mesh overlay", "there is no mesh",
+                       "name the mesh after the tree"};
+    if (out.heat && a.mesh_style == "overlay")
+        return Failure{kUsage, "--heat", "colours cannot be told when the mesh shines through",
+                       "leave out --mesh overlay, or try --section"};
+    const auto view = view_of(a.view);
+    if (!view) return view.error();
+    out.view = *view;
+    out.levels = a.levels;
+    out.mesh_style = static_cast<MeshStyle>(index_of(kMeshStyles, a.mesh_style));
+    out.samples = a.samples;
+    out.threads = a.threads;
+    out.floor_shadow = !a.no_shadow;
+    return out;
+}
 
+Outcome<ExitCode> run(RenderArguments& a) {
+    use_available_threads();
+    if (const std::string kind = extension(a.output); !kind.empty() && kind != "png")
+        return Failure{kUsage, a.output, "render writes PNG files only", "end the name in .png"};
+    auto options = sheet_options(a);
+    if (!options) return options.error();
+    a.outputs.reads(a.tree, "the tree");
+    a.outputs.reads_mesh(a.mesh, "the mesh");
+    if (const auto claimed = a.outputs.claim(a.output, "the picture", "png"); !claimed) return claimed.error();
+    const auto tree = read_tree(a.tree);
+    if (!tree) return tree.error();
+    const TreeView view = tree->view();
     std::optional<CleanMesh> mesh;
     if (!a.mesh.empty()) {
-        const BakeInfo info = view.bake_info();
-        const auto import = import_options(a.mesh_options, code, info.placement);
-        if (!import) return code;
-        const auto raw = read_mesh(a.mesh, code, *import);
-        if (!raw) return code;
-        auto cleaned = clean(raw->view(), info.weld);
-        if (!cleaned) return complain(a.mesh, cleaned.error());
-        mesh = std::move(*cleaned);
-        if (hash(mesh->mesh.view()) != view.bake_info().source_hash)
+        auto read = read_mesh_of(view, a.mesh, a.mesh_options);
+        if (!read) return read.error();
+        if (!read->own)
             note(a.mesh, fmt::format("not the mesh that {} was baked from{}", a.tree,
-                                     options.heat ? ": the colours tell how far the tree sticks out of another" : ""));
+                                     options->heat ? ": the colours tell how far the tree sticks out of another" : ""));
+        mesh = std::move(read->cleaned);
     }
-
-    options.levels = a.levels;
     // The root is by far the largest, so it would make all else small: it is shown only if asked for.
-    if (options.levels.empty())
+    if (options->levels.empty())
         for (uint32_t level = std::min(1u, view.level_count() - 1); level < std::min(4u, view.level_count()); ++level)
-            options.levels.push_back(level);
-    options.view = *viewer;
-    options.mesh_style = static_cast<MeshStyle>(index_of(kMeshStyles, a.mesh_style));
-    options.samples = a.samples;
-    options.threads = a.threads;
-    options.floor_shadow = !a.no_shadow;
+            options->levels.push_back(level);
     const auto rendered = [&] {
         ProgressLine line;
-        options.progress = [&line](double fraction) { return line.show("rendering", fraction); };
-        return render_sheet(view, mesh ? &*mesh : nullptr, options);
+        options->progress = [&line](double fraction) { return line.show("rendering", fraction); };
+        return render_sheet(view, mesh ? &*mesh : nullptr, *options);
     }();
-    if (!rendered) return complain("render", rendered.error());
+    if (!rendered) return failure_of("render", rendered.error());
     const auto png = encode_png(*rendered);
-    if (!png) return complain(a.output, png.error());
-    return a.outputs.write(a.output, *png, Outputs::Effort::long_);
+    if (!png) return failure_of(a.output, png.error());
+    const auto written = a.outputs.write(a.output, *png, Outputs::Effort::long_);
+    if (!written) return written.error();
+    return kDone;
 }
 
 } // namespace

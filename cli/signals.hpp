@@ -8,6 +8,9 @@ namespace prolate::cli {
 /// `command` is for the line. Also, writing into a closed pipe or beyond the file size limit is an error of write().
 void catch_signals(const char* command);
 
+/// That line is followed by the same as JSON, written to this file; -1, as in the beginning: it is not.
+void interruption_as_json(int file) noexcept;
+
 /// Has such a signal come while a GracefulStop lived? Its number, or 0.
 int interrupted() noexcept;
 

@@ -1,6 +1,6 @@
 #include "cli/threads.hpp"
 
-#include "cli/common.hpp"
+#include "cli/console.hpp"
 
 #include <fmt/format.h>
 

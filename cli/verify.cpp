@@ -1,5 +1,8 @@
 // prolate verify: proves anew, from the file and the mesh alone, that every level of the tree covers.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
+#include "cli/grouped.hpp"
+#include "cli/inputs.hpp"
 #include "cli/mesh_options.hpp"
 #include "cli/progress_line.hpp"
 #include "cli/threads.hpp"
@@ -85,30 +88,23 @@ std::string as_text(const VerifyReport& report) {
     return out;
 }
 
-int run(const VerifyArguments& a) {
+Outcome<ExitCode> run(const VerifyArguments& a) {
     use_available_threads();
-    int code = kDone;
-    const auto tree = read_tree(a.tree, code);
-    if (!tree) return code;
-    const BakeInfo info = tree->view().bake_info();
-    const auto import = import_options(a.mesh_options, code, info.placement);
-    if (!import) return code;
-    const auto mesh = read_mesh(a.mesh, code, *import);
-    if (!mesh) return code;
-    const auto cleaned = clean(mesh->view(), info.weld);
-    if (!cleaned) return complain(a.mesh, cleaned.error());
-    describe_mesh(a.mesh, cleaned->report);
-    const bool same_mesh = hash(cleaned->mesh.view()) == info.source_hash;
-    if (!same_mesh) note(a.tree, "this tree was baked from another mesh");
+    const auto tree = read_tree(a.tree);
+    if (!tree) return tree.error();
+    const auto mesh = read_mesh_of(tree->view(), a.mesh, a.mesh_options);
+    if (!mesh) return mesh.error();
+    describe_mesh(a.mesh, mesh->cleaned.report);
+    if (!mesh->own) note(a.tree, "this tree was baked from another mesh");
     const auto report = [&] {
         ProgressLine line;
         VerifyOptions options;
         options.threads = a.threads;
         options.progress = [&line](double fraction) { return line.show("prove", fraction); };
-        return verify(tree->view(), mesh->view(), options);
+        return verify(tree->view(), mesh->as_read.view(), options);
     }();
-    if (!report) return complain(a.mesh, report.error());
-    print(a.json ? as_json(*report, same_mesh) : as_text(*report));
+    if (!report) return failure_of(a.mesh, report.error());
+    print(a.json ? as_json(*report, mesh->own) : as_text(*report));
     return report->covered ? kDone : kNo;
 }
 

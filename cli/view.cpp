@@ -1,5 +1,7 @@
 // prolate view: trees to look at, and to move against each other, as one page for a browser.
-#include "cli/common.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
+#include "cli/inputs.hpp"
 #include "cli/mesh_options.hpp"
 #include "cli/outputs.hpp"
 #include "cli/pose.hpp"
@@ -7,6 +9,7 @@
 #include "cli/render/panel.hpp"
 #include "cli/threads.hpp"
 #include "cli/view/scene.hpp"
+#include "cli/words.hpp"
 
 #include <prolate/version.hpp>
 
@@ -76,72 +79,83 @@ std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& fil
     return assets;
 }
 
-int read_asset(Asset& asset, const MeshOptions& mesh_options) {
-    int code = kDone;
-    asset.tree = read_tree(asset.tree_path, code);
-    if (!asset.tree) return code;
+Outcome<> read_asset(Asset& asset, const MeshOptions& mesh_options) {
+    auto tree = read_tree(asset.tree_path);
+    if (!tree) return tree.error();
+    asset.tree = std::move(*tree);
     if (asset.mesh_path.empty()) {
         if (asset.tree->view().has_triangles()) asset.mesh = mesh_of(asset.tree->view());
-        return kDone;
+        return kSuccess;
     }
-    const BakeInfo info = asset.tree->view().bake_info();
-    const auto import = import_options(mesh_options, code, info.placement);
-    if (!import) return code;
-    const auto raw = read_mesh(asset.mesh_path, code, *import);
-    if (!raw) return code;
-    auto cleaned = clean(raw->view(), info.weld);
-    if (!cleaned) return complain(asset.mesh_path, cleaned.error());
-    asset.own_mesh = hash(cleaned->mesh.view()) == info.source_hash;
+    auto mesh = read_mesh_of(asset.tree->view(), asset.mesh_path, mesh_options);
+    if (!mesh) return mesh.error();
+    asset.own_mesh = mesh->own;
     if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
-    asset.mesh = std::move(*cleaned);
-    return kDone;
+    asset.mesh = std::move(mesh->cleaned);
+    return kSuccess;
 }
 
-int run(ViewArguments& a) {
-    use_available_threads();
+// What the page shows: trees with their meshes, and where the second body is.
+struct Request {
+    std::vector<Asset> assets;
+    std::optional<Pose> pose;
+};
+
+Outcome<Request> request_of(const ViewArguments& a) {
     if (const std::string kind = extension(a.output); !kind.empty() && kind != "html" && kind != "htm")
-        return complain(kUsage, a.output, "view writes HTML files only", "end the name in .html");
+        return Failure{kUsage, a.output, "view writes HTML files only", "end the name in .html"};
     auto assets = sort_files(a.files);
     if (!assets)
-        return complain(kUsage, "view", "a mesh must follow the tree that it belongs to",
-                        "name one or two .etree files, each with at most one mesh after it");
+        return Failure{kUsage, "view", "a mesh must follow the tree that it belongs to",
+                       "name one or two .etree files, each with at most one mesh after it"};
     if (assets->size() > 2)
-        return complain(kUsage, "view", fmt::format("{} trees are too many", assets->size()), "name one or two");
+        return Failure{kUsage, "view", fmt::format("{} trees are too many", assets->size()), "name one or two"};
     const bool two = assets->size() == 2;
-    std::optional<Pose> pose;
+    Request out{std::move(*assets), {}};
     if (!a.pose.empty()) {
-        if (!two) return complain(kUsage, "--pose", "there is no second body to place", "name two trees");
-        pose = parse_pose(a.pose);
-        if (!pose) return complain_of_pose();
+        if (!two) return Failure{kUsage, "--pose", "there is no second body to place", "name two trees"};
+        const auto pose = parse_pose(a.pose);
+        if (!pose) return pose.error();
+        out.pose = *pose;
     }
     if (two && !has_query_module())
-        return complain(kUsage, "view", "this prolate was built without emscripten, so its pages cannot answer queries",
-                        "view one tree, or install emscripten and build prolate again");
-    for (const Asset& asset : *assets) {
+        return Failure{kUsage, "view", "this prolate was built without emscripten, so its pages cannot answer queries",
+                       "view one tree, or install emscripten and build prolate again"};
+    return out;
+}
+
+Outcome<ExitCode> run(ViewArguments& a) {
+    use_available_threads();
+    auto request = request_of(a);
+    if (!request) return request.error();
+    for (const Asset& asset : request->assets) {
         a.outputs.reads(asset.tree_path, "the tree");
-        a.outputs.reads(asset.mesh_path, "the mesh");
+        a.outputs.reads_mesh(asset.mesh_path, "the mesh");
     }
-    if (const int code = a.outputs.claim(a.output, "the page", "html"); code != kDone) return code;
+    if (const auto claimed = a.outputs.claim(a.output, "the page", "html"); !claimed) return claimed.error();
 
     nlohmann::ordered_json scene{
         {"version", fmt::format("{}.{}.{}", PROLATE_VERSION_MAJOR, PROLATE_VERSION_MINOR, PROLATE_VERSION_PATCH)},
         {"up", a.up}};
-    if (pose) {
-        const auto& [t, r] = *pose;
+    if (request->pose) {
+        const auto& [t, r] = *request->pose;
         scene["pose"] = {t.x, t.y, t.z, r.x, r.y, r.z, r.w};
     }
     scene["bodies"] = nlohmann::ordered_json::array();
+    const bool two = request->assets.size() == 2;
     NumberBlock numbers;
-    for (Asset& asset : *assets) {
-        if (const int code = read_asset(asset, a.mesh_options); code != kDone) return code;
+    for (Asset& asset : request->assets) {
+        if (const auto read = read_asset(asset, a.mesh_options); !read) return read.error();
         ProgressLine line;
         auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
                                std::move(asset.mesh), asset.own_mesh},
                               numbers, two, [&line](double fraction) { return line.show("measuring", fraction); });
-        if (!body) return complain("view", Error{ErrorCode::cancelled});
+        if (!body) return failure_of("view", Error{ErrorCode::cancelled});
         scene["bodies"].push_back(std::move(*body));
     }
-    return a.outputs.write(a.output, view_page(scene, numbers, two), Outputs::Effort::long_);
+    const auto written = a.outputs.write(a.output, view_page(scene, numbers, two), Outputs::Effort::long_);
+    if (!written) return written.error();
+    return kDone;
 }
 
 } // namespace

@@ -1,7 +1,5 @@
 #include "cli/view_option.hpp"
 
-#include "cli/common.hpp"
-
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -20,7 +18,7 @@ void declare_view(CLI::App& command, ViewWords& words, const std::string& prefix
         ->capture_default_str();
 }
 
-std::optional<View> view_of(const ViewWords& words, int& code) {
+Outcome<View> view_of(const ViewWords& words) {
     View view;
     view.up = static_cast<UpAxis>(std::find(std::begin(kUpAxes), std::end(kUpAxes), words.up) - std::begin(kUpAxes));
     if (words.view.empty()) return view;
@@ -30,8 +28,7 @@ std::optional<View> view_of(const ViewWords& words, int& code) {
     const auto [rest, error] = std::from_chars(second ? comma + 1 : end, end, view.elevation);
     if (second && error == std::errc() && rest == end && std::isfinite(view.azimuth) && std::abs(view.elevation) <= 89)
         return view;
-    code = complain(kUsage, "--view", "not an azimuth and an elevation of -89 to 89 degrees", "write it as 30,18");
-    return {};
+    return Failure{kUsage, "--view", "not an azimuth and an elevation of -89 to 89 degrees", "write it as 30,18"};
 }
 
 } // namespace prolate::cli

@@ -1,9 +1,9 @@
 // The option --view of pictures: where the viewer stands.
 #pragma once
 
+#include "cli/failure.hpp"
 #include "cli/render/panel.hpp"
 
-#include <optional>
 #include <string>
 
 namespace CLI {
@@ -21,7 +21,7 @@ struct ViewWords {
 /// Declares both; `prefix` begins what they say of themselves.
 void declare_view(CLI::App& command, ViewWords& words, const std::string& prefix = "");
 
-/// What they say; complains and sets `code` if they make no sense.
-std::optional<View> view_of(const ViewWords& words, int& code);
+/// What they say.
+Outcome<View> view_of(const ViewWords& words);
 
 } // namespace prolate::cli

@@ -125,6 +125,10 @@ Result<void> can_save(const char* given_path) {
     const Descriptor trial(create_temporary(path, temporary));
     if (!trial) return io("cannot create a file there");
     ::unlink(temporary.c_str());
+    // A file that is replaced stays until the new one is whole, so there must be room for both.
+    const int error = ::posix_fallocate(trial.get(), 0, 4096);
+    if (error == ENOSPC || error == EDQUOT || error == EFBIG)
+        return Error{ErrorCode::io, "there is no room for a file", static_cast<uint64_t>(error)};
     return {};
 }
 

@@ -1,6 +1,7 @@
 #include "cli/bake/asset.hpp"
 
-#include "cli/common.hpp"
+#include "cli/console.hpp"
+#include "cli/inputs.hpp"
 #include "cli/levels.hpp"
 #include "cli/progress_line.hpp"
 
@@ -36,11 +37,11 @@ std::optional<Baked> reuse(std::optional<Tree>& old, const BakeCache& cache, uin
 }
 
 // Reuses or bakes; writes nothing but cache entries.
-std::optional<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::string& label, int& code) {
-    const auto options = options_of(a, code);
-    if (!options) return {};
-    const auto import = import_options(a.mesh_options, code);
-    if (!import) return {};
+Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::string& label) {
+    const auto options = options_of(a);
+    if (!options) return options.error();
+    const auto import = import_options(a.mesh_options);
+    if (!import) return import.error();
     const uint64_t key = hash(*options);
     std::optional<Tree> old = rebake ? std::nullopt : old_output(a);
 
@@ -49,21 +50,21 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const s
     if (cache) file = hash_mesh_file(a.mesh.c_str(), *import);
     if (file && !rebake)
         if (const auto seen = cache.find_source(*file))
-            if (auto baked = reuse(old, cache, *seen, key)) return baked;
+            if (auto baked = reuse(old, cache, *seen, key)) return std::move(*baked);
 
-    const auto mesh = read_mesh(a.mesh, code, *import);
-    if (!mesh) return {};
+    const auto mesh = read_mesh(a.mesh, *import);
+    if (!mesh) return mesh.error();
     // The mesh itself says it, if there is anything to compare it with.
     if ((old && old->view().bake_info().options_hash == key) || cache) {
         const auto cleaned = clean(mesh->view(), options->weld);
-        if (!cleaned) return code = complain(a.mesh, cleaned.error()), std::nullopt;
+        if (!cleaned) return failure_of(a.mesh, cleaned.error());
         const uint64_t source = hash(cleaned->mesh.view());
         // Remembered only if the file was the same before and after it was read.
         if (file && *file == hash_mesh_file(a.mesh.c_str(), *import)) cache.keep_source(*file, source);
         if (!rebake)
             if (auto baked = reuse(old, cache, source, key)) {
                 baked->diagnosis = cleaned->report;
-                return baked;
+                return std::move(*baked);
             }
     }
     auto built = [&] {
@@ -72,7 +73,7 @@ std::optional<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const s
                      [&line](const BuildProgress& p) { return line.show(p.stage, p.fraction, p.nodes); });
     }();
     if (built && interrupted()) built = Error{ErrorCode::cancelled};
-    if (!built) return code = complain(a.mesh, built.error()), std::nullopt;
+    if (!built) return failure_of(a.mesh, built.error());
     describe_mesh(a.mesh, built->mesh);
     Baked baked{Source::baked, std::move(built->tree), built->mesh, {}};
     for (const LevelReport& level : built->levels) baked.level_seconds.push_back(level.seconds);
@@ -119,11 +120,10 @@ const char* name_of(Source source) {
     return "";
 }
 
-std::optional<BuildOptions> options_of(const Asset& a, int& code) {
+Outcome<BuildOptions> options_of(const Asset& a) {
     BuildOptions options = a.options;
-    const auto refuse = [&code](const char* option, const char* what, const char* advice) {
-        code = complain(kUsage, option, what, advice);
-        return std::nullopt;
+    const auto refuse = [](const char* option, const char* what, const char* advice) {
+        return Failure{kUsage, option, what, advice};
     };
     if (a.method == "analytic")
         options.method = Method::analytic;
@@ -151,28 +151,25 @@ std::optional<BuildOptions> options_of(const Asset& a, int& code) {
     options.ellipsoids = a.ellipsoids.value_or(0);
     options.tolerance = a.tolerance.value_or(0);
     options.distance = a.distance.value_or(0);
-    if (const auto valid = validate(options); !valid) {
-        code = complain("bake", valid.error());
-        return std::nullopt;
-    }
+    if (const auto valid = validate(options); !valid) return failure_of("bake", valid.error());
     return options;
 }
 
 void name_inputs(const Asset& a, Outputs& outputs, const std::string& whose) {
-    outputs.reads(a.mesh, "the mesh" + whose);
+    outputs.reads_mesh(a.mesh, "the mesh" + whose);
 }
 
-int claim_outputs(const Asset& a, Outputs& outputs, const std::string& whose) {
-    const int code = outputs.claim(a.output, "the output" + whose, "etree");
-    return code == kDone ? outputs.claim(a.report, "the report" + whose, "json") : code;
+Outcome<> claim_outputs(const Asset& a, Outputs& outputs, const std::string& whose) {
+    const auto claimed = outputs.claim(a.output, "the output" + whose, "etree");
+    return claimed ? outputs.claim(a.report, "the report" + whose, "json") : claimed;
 }
 
-std::optional<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cache, bool rebake,
-                                const std::string& label, int& code) {
+Outcome<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cache, bool rebake,
+                          const std::string& label) {
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
-    auto baked = make(a, cache, rebake, label, code);
-    if (!baked) return {};
+    auto baked = make(a, cache, rebake, label);
+    if (!baked) return baked;
     if (!baked->tree.view().bake_info().goal_reached)
         note(a.mesh, "the asked number, tolerance or distance was not reached at this resolution; try --quality best");
     cache.keep(baked->tree.view(), baked->source == Source::baked);
@@ -180,12 +177,14 @@ std::optional<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCach
         // For make and its like, which go by dates. Whose file it is not may not do so, and loses nothing but that.
         ::utimensat(AT_FDCWD, a.output.c_str(), nullptr, 0);
     } else {
-        code = outputs.write(a.output, baked->tree.bytes(), cache ? Outputs::Effort::small : Outputs::Effort::long_);
-        if (code != kDone && cache) note(a.output, "the cache has the tree: the next run takes it from there");
-        if (code != kDone) return {};
+        const auto written =
+            outputs.write(a.output, baked->tree.bytes(), cache ? Outputs::Effort::small : Outputs::Effort::long_);
+        if (!written && cache)
+            return advised(written.error(), "the cache has the tree, and the next run takes it from there");
+        if (!written) return written.error();
     }
     baked->seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    if (code = outputs.write(a.report, text_of(report_of(a, *baked))); code != kDone) return {};
+    if (const auto written = outputs.write(a.report, text_of(report_of(a, *baked))); !written) return written.error();
     return baked;
 }
 

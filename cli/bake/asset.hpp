@@ -3,6 +3,7 @@
 #pragma once
 
 #include "cli/bake/cache.hpp"
+#include "cli/failure.hpp"
 #include "cli/mesh_options.hpp"
 #include "cli/outputs.hpp"
 
@@ -50,19 +51,18 @@ struct Baked {
     double seconds = 0;                  ///< all in all
 };
 
-/// The asset's options as the library takes them; or a complaint, and `code`.
-std::optional<BuildOptions> options_of(const Asset& asset, int& code);
+/// The asset's options as the library takes them.
+Outcome<BuildOptions> options_of(const Asset& asset);
 
 /// Names the asset's inputs, or claims its outputs: all inputs of a run come before all outputs. `whose` is "", or
 /// " of asset 2".
 void name_inputs(const Asset& asset, Outputs& outputs, const std::string& whose = "");
-int claim_outputs(const Asset& asset, Outputs& outputs, const std::string& whose = "");
+Outcome<> claim_outputs(const Asset& asset, Outputs& outputs, const std::string& whose = "");
 
 /// Makes sure that the output is what the mesh and the options make, at the least cost (`rebake`: by baking), with a
-/// new date, and writes the report. Complains and sets `code` if it cannot; then the output is what it was before.
-/// `label` is for the progress line.
-std::optional<Baked> bake_asset(const Asset& asset, const Outputs& outputs, BakeCache& cache, bool rebake,
-                                const std::string& label, int& code);
+/// new date, and writes the report. If it fails, the output is what it was before. `label` is for the progress line.
+Outcome<Baked> bake_asset(const Asset& asset, const Outputs& outputs, BakeCache& cache, bool rebake,
+                          const std::string& label);
 
 /// All figures, as --report and --json have them.
 nlohmann::ordered_json report_of(const Asset& asset, const Baked& baked);

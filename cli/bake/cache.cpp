@@ -1,6 +1,7 @@
 #include "cli/bake/cache.hpp"
 
-#include "cli/common.hpp"
+#include "cli/console.hpp"
+#include "cli/inputs.hpp"
 
 #include <fmt/format.h>
 

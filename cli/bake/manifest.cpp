@@ -1,9 +1,12 @@
 #include "cli/bake/manifest.hpp"
 
 #include "cli/bake/asset.hpp"
-#include "cli/common.hpp"
+#include "cli/console.hpp"
+#include "cli/grouped.hpp"
+#include "cli/inputs.hpp"
 #include "cli/levels.hpp"
 #include "cli/signals.hpp"
+#include "cli/words.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -32,20 +35,15 @@ struct Entry {
     std::string error; // empty: none so far
 };
 
-// Reads and parses the file; complains and sets `code` if it cannot.
-Json read_json(const std::string& path, int& code) {
+Outcome<Json> read_json(const std::string& path) {
     const auto text = read_file(path);
-    if (!text) {
-        code = complain(path, text.error());
-        return {};
-    }
+    if (!text) return failure_of(path, text.error());
     try {
         return Json::parse(*text);
     } catch (const Json::exception& e) {
         std::string what = e.what(); // "[json.exception...] parse error at line 3, column 1: ..."
         if (const size_t at = what.find("] "); at != what.npos) what.erase(0, at + 2);
-        code = complain(kBadInput, path, "is no JSON: " + what, kAdvice);
-        return {};
+        return Failure{kBadInput, path, "is no JSON: " + what, kAdvice};
     }
 }
 
@@ -114,14 +112,12 @@ Json merged(Json defaults, const Json& entry) {
     return defaults;
 }
 
-// All entries, badly written ones with their error; or complains and sets `code`.
-std::vector<Entry> read_manifest(const std::string& path, const ManifestOptions& options, int& code) {
-    const Json root = read_json(path, code);
-    if (code != kDone) return {};
-    const auto refuse = [&](const std::string& what) {
-        code = complain(kBadInput, path, what, kAdvice);
-        return std::vector<Entry>();
-    };
+// All entries, badly written ones with their error.
+Outcome<std::vector<Entry>> read_manifest(const std::string& path, const ManifestOptions& options) {
+    const auto json = read_json(path);
+    if (!json) return json.error();
+    const Json& root = *json;
+    const auto refuse = [&path](const std::string& what) { return Failure{kBadInput, path, what, kAdvice}; };
     if (!root.is_object() || !root.contains("assets") || !root["assets"].is_array())
         return refuse("must be an object with an array \"assets\"");
     for (const auto& item : root.items())
@@ -163,23 +159,45 @@ std::string title(size_t index, const Entry& entry) {
     return fmt::format("asset {} ({})", index + 1, entry.name);
 }
 
-// Complains of all that can be told without baking, and keeps it as the entry's error.
-void check(Entry& entry, size_t index, Outputs& outputs) {
-    if (!entry.error.empty()) {
-        complain(kBadInput, title(index, entry), entry.error, "correct the manifest");
-        return;
-    }
-    const PartOfWork part(title(index, entry));
-    int code = kDone;
+// Tells a failure of the asset, and keeps it as the entry's error.
+void fail(Entry& entry, const Failure& failure) {
+    tell(failure);
+    entry.error = failure.subject + ": " + failure.what;
+}
+
+// What can be told of an entry without baking.
+Outcome<> check(const Entry& entry, size_t index, Outputs& outputs) {
+    if (const auto options = options_of(entry.asset); !options) return options.error();
     std::error_code none;
-    if (!options_of(entry.asset, code)) {
-        // complained
-    } else if (!fs::exists(entry.asset.mesh, none)) {
-        complain(entry.asset.mesh, Error{ErrorCode::io, "cannot open the file", ENOENT});
-    } else {
-        claim_outputs(entry.asset, outputs, fmt::format(" of asset {}", index + 1));
+    if (!fs::exists(entry.asset.mesh, none))
+        return failure_of(entry.asset.mesh, Error{ErrorCode::io, "cannot open the file", ENOENT});
+    return claim_outputs(entry.asset, outputs, fmt::format(" of asset {}", index + 1));
+}
+
+// What can be known at once is said at once, before hours of work.
+void check_all(std::vector<Entry>& entries, Outputs& outputs) {
+    for (size_t i = 0; i < entries.size(); ++i) {
+        Entry& entry = entries[i];
+        if (!entry.error.empty()) {
+            tell({kBadInput, title(i, entry), entry.error, "correct the manifest"});
+            continue;
+        }
+        const PartOfWork part(title(i, entry));
+        if (const auto sound = check(entry, i, outputs); !sound) fail(entry, sound.error());
     }
-    entry.error = part.complaint();
+}
+
+// Bakes one asset, whatever becomes of it.
+void bake(Entry& entry, size_t index, size_t count, const Outputs& outputs, BakeCache& cache, bool rebake) {
+    const PartOfWork part(title(index, entry));
+    const std::string label = fmt::format("[{}/{}] {}  ", index + 1, count, entry.name);
+    const auto baked = guarded([&] { return bake_asset(entry.asset, outputs, cache, rebake, label); });
+    if (!baked && baked.error().code == kInterrupted) return tell(baked.error());
+    if (!baked) return fail(entry, baked.error());
+    entry.report = report_of(entry.asset, *baked);
+    note(entry.asset.output,
+         fmt::format("{}, {} nodes, {} bytes, {:.2f} s", name_of(baked->source),
+                     grouped(baked->tree.view().node_count()), grouped(baked->tree.bytes().size()), baked->seconds));
 }
 
 Json summary_json(const std::string& path, const std::vector<Entry>& entries) {
@@ -230,51 +248,34 @@ std::string summary_table(const std::vector<Entry>& entries) {
 
 } // namespace
 
-int bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache, const ManifestOptions& options) {
-    int code = kDone;
-    std::vector<Entry> entries = read_manifest(path, options, code);
-    if (code != kDone) return code;
+Outcome<ExitCode> bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache,
+                                const ManifestOptions& options) {
+    auto read = read_manifest(path, options);
+    if (!read) return read.error();
+    std::vector<Entry>& entries = *read;
     const GracefulStop keeps_what_is_done;
-    // What can be known at once is said at once, before hours of work.
     outputs.reads(path, "the manifest");
     for (size_t i = 0; i < entries.size(); ++i)
         name_inputs(entries[i].asset, outputs, fmt::format(" of asset {}", i + 1));
-    if (code = outputs.claim(options.report, "the summary", "json"); code != kDone) return code;
-    for (size_t i = 0; i < entries.size(); ++i) check(entries[i], i, outputs);
+    if (const auto claimed = outputs.claim(options.report, "the summary", "json"); !claimed) return claimed.error();
+    check_all(entries, outputs);
+    for (size_t i = 0; i < entries.size() && !interrupted(); ++i)
+        if (entries[i].error.empty()) bake(entries[i], i, entries.size(), outputs, cache, options.rebake);
 
-    for (size_t i = 0; i < entries.size() && !interrupted(); ++i) {
-        Entry& entry = entries[i];
-        if (!entry.error.empty()) continue;
-        const PartOfWork part(title(i, entry));
-        const std::string label = fmt::format("[{}/{}] {}  ", i + 1, entries.size(), entry.name);
-        std::optional<Baked> baked;
-        const int failure = guarded([&] {
-            int failed = kDone;
-            baked = bake_asset(entry.asset, outputs, cache, options.rebake, label, failed);
-            return failed;
-        });
-        if (baked) {
-            entry.report = report_of(entry.asset, *baked);
-            note(entry.asset.output, fmt::format("{}, {} nodes, {} bytes, {:.2f} s", name_of(baked->source),
-                                                 grouped(baked->tree.view().node_count()),
-                                                 grouped(baked->tree.bytes().size()), baked->seconds));
-        } else if (failure != kInterrupted) {
-            entry.error = part.complaint();
-        }
-    }
     const Json summary = summary_json(path, entries);
     const std::string text = text_of(summary);
     if (options.json)
         print(text);
     else if (!is_quiet())
         print(summary_table(entries));
-    if (code = outputs.write(options.report, text, Outputs::Effort::account); code != kDone) return code;
+    if (const auto written = outputs.write(options.report, text, Outputs::Effort::account); !written)
+        return written.error();
     if (const int not_done = summary["not_done"]; not_done > 0)
-        return complain(kInterrupted, path,
-                        fmt::format("interrupted with {} of {} assets not done", not_done, entries.size()),
-                        "run it again to go on");
+        return Failure{kInterrupted, path,
+                       fmt::format("interrupted with {} of {} assets not done", not_done, entries.size()),
+                       "run it again to go on"};
     if (const int failed = summary["failed"]; failed > 0)
-        return complain(kNo, path, fmt::format("{} of {} assets failed", failed, entries.size()), "see above");
+        return Failure{kNo, path, fmt::format("{} of {} assets failed", failed, entries.size()), "see above"};
     return kDone;
 }
 

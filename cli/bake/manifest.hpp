@@ -2,6 +2,7 @@
 #pragma once
 
 #include "cli/bake/cache.hpp"
+#include "cli/failure.hpp"
 #include "cli/outputs.hpp"
 
 #include <cstdint>
@@ -16,8 +17,9 @@ struct ManifestOptions {
     std::string report;   ///< also write the summary to this JSON file, unless empty
 };
 
-/// Bakes the assets one after the other, each with a line on stderr, and prints a summary. Returns kDone, kNo if some
-/// assets failed, kInterrupted, or the code of an error in the manifest itself.
-int bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache, const ManifestOptions& options);
+/// Bakes the assets one after the other, each with a line on stderr, and prints a summary. Fails with kNo if some
+/// assets failed, with kInterrupted, or because of the manifest itself.
+Outcome<ExitCode> bake_manifest(const std::string& path, Outputs& outputs, BakeCache& cache,
+                                const ManifestOptions& options);
 
 } // namespace prolate::cli

@@ -90,6 +90,33 @@ TEST_F(CliOutputs, NoOutputIsAnInputWhateverItIsCalled) {
     expect_refused(Words{"export", t, "-o", file("here/here/t.etree"), "--format", "csv"}, 2, "the tree");
 }
 
+TEST_F(CliOutputs, FilesThatAMeshIsReadFromAreInputs) {
+    // A tetrahedron whose numbers lie in two files; the name of one is escaped.
+    const float points[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const uint16_t corners[12] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    const std::string binary = file("the points.bin", {reinterpret_cast<const char*>(points), sizeof points});
+    file("corners.bin", {reinterpret_cast<const char*>(corners), sizeof corners});
+    const std::string m = file("m.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 1, "byteLength": 24}],
+        "buffers": [{"uri": "the%20points.bin", "byteLength": 48}, {"uri": "corners.bin", "byteLength": 24}]})");
+    fs::create_hard_link(binary, folder_ / "hard");
+    for (const char* name : {"the points.bin", "corners.bin", "hard"})
+        expect_refused(bake(m) + Words{"-o", file(name), "--force"}, 2, "read with the mesh");
+    expect_refused(Words{"render", tree(), m, "-o", file("hard"), "--force"}, 2, "read with the mesh");
+    const std::string manifest =
+        file("assets.json", R"({"assets": [{"mesh": "m.obj", "output": "corners.bin", "ellipsoids": 1},
+                                           {"mesh": "m.gltf", "output": "a.etree", "ellipsoids": 1}]})");
+    mesh();
+    const Outcome o = run({"bake", "--manifest", manifest, "--json", "--force"});
+    EXPECT_EQ(Json::parse(o.out)["failed"], 1) << o.err;
+    EXPECT_NE(o.err.find("read with the mesh of asset 2"), std::string::npos) << o.err;
+    EXPECT_EQ(run({"info", file("a.etree")}).code, 0);
+}
+
 TEST_F(CliOutputs, NoOutputIsAnotherOutput) {
     const std::string m = mesh();
     fs::create_symlink("a.etree", folder_ / "dangling");
@@ -254,7 +281,10 @@ TEST_F(CliOutputs, WhatCannotBeWrittenInTheEndIsKept) {
     refused.in_child = [&kept_in] { ::setenv("TMPDIR", kept_in.c_str(), 1); };
     const Outcome o = run(bake(m) + Words{"-o", "/dev/full"}, refused);
     EXPECT_EQ(o.code, 4) << o.err;
-    EXPECT_NE(o.err.find("is kept as " + kept_in), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("; what was made is kept as " + kept_in), std::string::npos) << o.err;
+    const Outcome as_json = run(bake(m) + Words{"-o", "/dev/full", "--json", "--quiet"}, refused);
+    EXPECT_EQ(std::count(as_json.err.begin(), as_json.err.end(), '\n'), 1) << as_json.err;
+    EXPECT_NE(Json::parse(as_json.out)["error"]["advice"].get<std::string>().find(kept_in), std::string::npos);
     ASSERT_EQ(run(bake(m) + Words{"-o", file("a.etree")}).code, 0);
     EXPECT_EQ(read(file("tmp/kept-1-full")), read(file("a.etree")));
     // A cache has it anyway.
@@ -263,6 +293,19 @@ TEST_F(CliOutputs, WhatCannotBeWrittenInTheEndIsKept) {
     EXPECT_NE(cached.err.find("the cache has the tree"), std::string::npos) << cached.err;
     EXPECT_NE(run(bake(m) + Words{"-o", file("b.etree"), "--cache", file("cache")}).err.find("from the cache"),
               std::string::npos);
+}
+
+TEST_F(CliOutputs, ALackOfSpaceIsToldBeforeTheWork) {
+    RunOptions small;
+    small.in_child = [] {
+        const rlimit limit{1024, 1024};
+        ::setrlimit(RLIMIT_FSIZE, &limit);
+    };
+    const std::string broken = file("broken.obj", "f 1 2 3\n");
+    const Outcome o = run(bake(broken) + Words{"-o", file("a.etree")}, small);
+    EXPECT_EQ(o.code, 4) << o.err;
+    EXPECT_NE(o.err.find("ulimit -f"), std::string::npos) << o.err;
+    EXPECT_EQ(listing(), Words{"broken.obj"});
 }
 
 TEST_F(CliOutputs, AClosedPipeForMessagesKillsNothing) {
@@ -378,24 +421,26 @@ TEST_F(CliOutputs, TheProgressLineFitsAndDumbTerminalsGetNone) {
              Json{{"assets", {{{"mesh", name}, {"output", "a.etree"}, {"levels", 1}, {"quality", "fast"}}}}}.dump());
     RunOptions terminal;
     terminal.terminal = true;
-    terminal.in_child = [] {
-        const winsize size{24, 40, 0, 0};
-        ::ioctl(2, TIOCSWINSZ, &size);
-        ::setenv("TERM", "xterm", 1);
-    };
-    const Outcome narrow = run({"bake", "--manifest", manifest, "--json"}, terminal);
-    EXPECT_EQ(narrow.code, 0);
-    size_t drawn = 0;
-    for (size_t at = 0; (at = narrow.err.find("\r\x1b[K", at)) != std::string::npos; at += 4) {
-        const size_t end = std::min(narrow.err.find_first_of("\r\n", at + 4), narrow.err.size());
-        const std::string line = narrow.err.substr(at + 4, end - at - 4);
-        if (line.starts_with("prolate: ")) continue; // behind the wiped line
-        EXPECT_LT(line.size(), 40u) << line;
-        drawn += !line.empty();
+    for (const unsigned short width : std::initializer_list<unsigned short>{1, 2, 3, 12, 40}) {
+        terminal.in_child = [width] {
+            const winsize size{24, width, 0, 0};
+            ::ioctl(2, TIOCSWINSZ, &size);
+            ::setenv("TERM", "xterm", 1);
+        };
+        const Outcome narrow = run({"bake", "--manifest", manifest, "--json", "--rebake"}, terminal);
+        EXPECT_EQ(narrow.code, 0);
+        size_t drawn = 0;
+        for (size_t at = 0; (at = narrow.err.find("\r\x1b[K", at)) != std::string::npos; at += 4) {
+            const size_t end = std::min(narrow.err.find_first_of("\r\n", at + 4), narrow.err.size());
+            const std::string line = narrow.err.substr(at + 4, end - at - 4);
+            if (line.starts_with("prolate: ")) continue; // behind the wiped line
+            EXPECT_LT(line.size(), width) << line;
+            drawn += !line.empty();
+        }
+        EXPECT_EQ(drawn > 0, width > 1) << width;
+        EXPECT_EQ(narrow.err.find("\x1b[31m"), std::string::npos) << "a name is no command to the terminal";
+        EXPECT_NE(narrow.err.find("\\x1b[31m"), std::string::npos) << narrow.err;
     }
-    EXPECT_GT(drawn, 0u);
-    EXPECT_EQ(narrow.err.find("\x1b[31m"), std::string::npos) << "a name is no command to the terminal";
-    EXPECT_NE(narrow.err.find("\\x1b[31m"), std::string::npos) << narrow.err;
 
     terminal.in_child = [] { ::setenv("TERM", "dumb", 1); };
     const Outcome dumb = run(Words{"bake", m, "-o", file("b.etree"), "--levels", "1", "--quality", "fast"}, terminal);
@@ -434,8 +479,10 @@ TEST_F(CliOutputs, SignalsEndTheWorkAndLeaveNothing) {
             options.interrupt_after = std::chrono::milliseconds(early ? 0 : 300);
             const auto before = listing();
             const Outcome o =
-                run({"bake", large, "-o", file("a.etree"), "--quality", "best", "--ellipsoids", "20000"}, options);
+                run({"bake", large, "-o", file("a.etree"), "--quality", "best", "--ellipsoids", "20000", "--json"},
+                    options);
             EXPECT_EQ(o.code, 128 + number) << o.err;
+            EXPECT_EQ(Json::parse(o.out)["error"]["code"], 128 + number);
             EXPECT_NE(o.err.find("interrupted; nothing was written"), std::string::npos) << o.err;
             EXPECT_EQ(listing(), before);
         }
@@ -450,7 +497,21 @@ TEST_F(CliOutputs, SignalsEndTheWorkAndLeaveNothing) {
         const Outcome o = run(words, waits);
         EXPECT_EQ(o.code, 130) << o.err;
         EXPECT_EQ(o.err, "prolate: " + words[0] + ": interrupted; nothing was written\n");
+        EXPECT_EQ(o.out, "");
     }
+    const Outcome as_json = run({"info", "-", "--json"}, waits);
+    EXPECT_EQ(as_json.out, R"({
+  "error": {
+    "code": 130,
+    "subject": "info",
+    "what": "interrupted",
+    "advice": "nothing was written"
+  }
+}
+)");
+    const Outcome aside = run({"bake", "-", "-o", "-", "--json"}, waits);
+    EXPECT_EQ(aside.out, "") << "standard output is for the tree";
+    EXPECT_NE(aside.err.find("\"code\": 130"), std::string::npos) << aside.err;
     ::close(ends[0]);
     ::close(ends[1]);
 }
