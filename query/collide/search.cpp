@@ -22,7 +22,6 @@
 
 #include "query/collide/search.hpp"
 #include "query/node/hull_lanes-inl.hpp"
-#include "query/triangle/leaves-inl.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -109,24 +108,19 @@ private:
 
     // What is known of the lanes that were not parted.
     struct Kept {
-        alignas(64) float depth[kBlockLanes];                             // p / (a + b)
-        alignas(64) float x[kBlockLanes], y[kBlockLanes], z[kBlockLanes]; // n
-        alignas(64) float gap[kBlockLanes];                               // beyond the margins
+        alignas(64) float depth[kBlockLanes]; // p / (a + b)
+        alignas(64) float n[3][kBlockLanes];
+        alignas(64) float gap[kBlockLanes]; // beyond the margins
         alignas(64) float a[kBlockLanes], b[kBlockLanes];
         alignas(64) float in_a[3][kBlockLanes], in_b[3][kBlockLanes]; // L1^T n, L2^T n
-        HWY_INLINE void keep(const LaneTerms& t, Lanes margin, size_t i) {
-            const LaneTag d;
-            hn::Store(hn::Div(t.p, t.sum), d, depth + i);
-            hn::Store(t.x, d, x + i), hn::Store(t.y, d, y + i), hn::Store(t.z, d, z + i);
-            hn::Store(t.a, d, a + i), hn::Store(t.b, d, b + i);
-            hn::Store(t.in_a.x, d, in_a[0] + i), hn::Store(t.in_a.y, d, in_a[1] + i),
-                hn::Store(t.in_a.z, d, in_a[2] + i);
-            hn::Store(t.in_b.x, d, in_b[0] + i), hn::Store(t.in_b.y, d, in_b[1] + i),
-                hn::Store(t.in_b.z, d, in_b[2] + i);
-            Lanes beyond = t.gap;
-            if constexpr (kMargin) beyond = hn::Sub(beyond, hn::Mul(margin, length({t.x, t.y, t.z})));
-            const auto fit = hn::Gt(t.length, hn::Set(d, kLaneDirection));
-            hn::Store(hn::IfThenElse(fit, beyond, hn::Set(d, -HUGE_VALF)), d, gap + i);
+        HWY_INLINE void keep(const LaneTerms& t, Float margin, size_t i) {
+            store(t.p / t.sum, depth + i);
+            store(t.n, n, i);
+            store(t.a, a + i), store(t.b, b + i);
+            store(t.in_a, in_a, i), store(t.in_b, in_b, i);
+            Float beyond = t.gap;
+            if constexpr (kMargin) beyond = beyond - margin * length(t.n);
+            store(choose(t.one_norm > kLaneDirection, beyond, set(-HUGE_VALF)), gap + i);
         }
     };
 
@@ -156,7 +150,6 @@ private:
     // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
     HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
-        const LaneTag d;
         Side& side = sides_[open];
         const std::byte* const block = side.block(first);
         ++block_tests_;
@@ -172,11 +165,11 @@ private:
         if (meet == 0) return false;
         uint32_t met = 0, larger = 0;
         Kept kept;
-        const Lanes margin = hn::Set(d, lattice_margin);
-        for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+        const Float margin = set(lattice_margin);
+        for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
             const LaneTerms t = evaluate(load_nodes(block, i, side.step_exponent), single);
-            met |= bits_of(hn::Not(separated<kMargin>(t, margin)), i);
-            larger |= bits_of(hn::Gt(t.size, hn::Set(d, single.size)), i);
+            met |= bits(!separated<kMargin>(t, margin)) << i;
+            larger |= bits(t.size > single.size) << i;
             kept.keep(t, margin, i);
         }
         meet &= met;
@@ -216,7 +209,7 @@ private:
             lanes &= ~(1u << lane);
             const bool look = kept.depth[lane] > kLeavesNearlyParted;
             const glm::dvec3 to_lane =
-                look ? glm::dvec3(kept.x[lane], kept.y[lane], kept.z[lane]) : glm::dvec3(0); // in its frame
+                look ? glm::dvec3(kept.n[0][lane], kept.n[1][lane], kept.n[2][lane]) : glm::dvec3(0); // in its frame
             if (open != 0 ? d_.meet(other, first + lane, d_.b_to_a.rotation * to_lane)
                           : d_.meet(first + lane, other, -to_lane))
                 return true;

@@ -251,12 +251,11 @@ private:
     static HWY_INLINE void note_skipped(const LaneBounds& bounds, uint32_t lanes, Side& side) {
         if (lanes == 0) return;
         alignas(8) uint8_t bits[8] = {static_cast<uint8_t>(lanes)};
-        const WideTag w;
-        for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(w)) {
+        for (size_t i = 0; i < kBlockLanes; i += kDoubleLanes) {
             bits[0] = static_cast<uint8_t>(lanes >> i);
-            const auto bound = hn::IfThenElse(hn::LoadMaskBits(w, bits), hn::Load(w, bounds.lower + i),
-                                              hn::Set(w, DistanceSearch::kInfinity));
-            hn::Store(hn::Min(hn::Load(w, side.skipped + i), bound), w, side.skipped + i);
+            const Double bound = choose(hn::LoadMaskBits(DoubleTag(), bits), load<Double>(bounds.lower + i),
+                                        broadcast<Double>(DistanceSearch::kInfinity));
+            store(min(load<Double>(side.skipped + i), bound), side.skipped + i);
         }
     }
     // The greater of a pair's own bound, as it is kept, and its parent's.

@@ -28,56 +28,47 @@
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
-HWY_INLINE Lanes sum_of_products(Lanes x, Lanes y, Lanes z, Lanes w) {
-    return hn::Add(hn::Mul(x, y), hn::Mul(z, w));
-}
-
 /// Sum of the moduli of L's entries: bounds |L|.
-HWY_INLINE Lanes entry_sum(const LaneNodes& e) {
-    const Lanes diagonal = hn::Add(hn::Add(e.l11, e.l22), e.l33);
-    return hn::Add(diagonal, hn::Add(hn::Add(hn::Abs(e.l21), hn::Abs(e.l31)), hn::Abs(e.l32)));
+HWY_INLINE Float entry_sum(const Lower3& l) {
+    return l.l11 + l.l22 + l.l33 + (abs(l.l21) + abs(l.l31) + abs(l.l32));
 }
 
 /// Lanes that rays from `point` along an axis and its opposite may meet, as bits from lane `first` on; all others are
 /// set too.
 template <size_t kAxis> HWY_INLINE AxisMask axis_lanes(const LaneNodes& e, const LatticePoint& point, size_t first) {
-    const LaneTag d;
-    const auto set = [d](float value) { return hn::Set(d, value); };
-    const Lanes r[3] = {hn::Sub(e.x, set(point.position[0])), hn::Sub(e.y, set(point.position[1])),
-                        hn::Sub(e.z, set(point.position[2]))};
+    const Lower3& l = e.factor;
+    const Float3 from = e.center - set(point.position);
+    const Float r[3] = {from.x, from.y, from.z};
     // P = {{a, b}, {b, c}}, scaled so that squares of n cannot overflow, and |row k|.
-    Lanes a, b, c, half;
+    const Sym3 q = shape_of(l);
+    Float a, b, c, half;
     if constexpr (kAxis == 0) {
-        a = sum_of_products(e.l21, e.l21, e.l22, e.l22), b = sum_of_products(e.l21, e.l31, e.l22, e.l32);
-        c = sum_of_squares(e.l31, e.l32, e.l33), half = e.l11;
+        a = q.yy, b = q.yz, c = q.zz, half = l.l11;
     } else if constexpr (kAxis == 1) {
-        a = sum_of_squares(e.l31, e.l32, e.l33), b = hn::Mul(e.l31, e.l11), c = hn::Mul(e.l11, e.l11);
-        half = hn::Sqrt(sum_of_products(e.l21, e.l21, e.l22, e.l22));
+        a = q.zz, b = q.xz, c = q.xx, half = sqrt(q.yy);
     } else {
-        a = hn::Mul(e.l11, e.l11), b = hn::Mul(e.l11, e.l21), c = sum_of_products(e.l21, e.l21, e.l22, e.l22);
-        half = hn::Sqrt(sum_of_squares(e.l31, e.l32, e.l33));
+        a = q.xx, b = q.xy, c = q.yy, half = sqrt(q.zz);
     }
-    const Lanes ri = r[(kAxis + 1) % 3], rj = r[(kAxis + 2) % 3], rk = r[kAxis];
-    const Lanes si = hn::Mul(ri, set(kAxisScale)), sj = hn::Mul(rj, set(kAxisScale));
-    const Lanes ni = minor(c, si, b, sj), nj = minor(a, sj, b, si);
-    Lanes square; // |F^T n|^2
+    const Float ri = r[(kAxis + 1) % 3], rj = r[(kAxis + 2) % 3], rk = r[kAxis];
+    const Float si = ri * kAxisScale, sj = rj * kAxisScale;
+    const Float ni = c * si - b * sj, nj = a * sj - b * si;
+    Float square; // |F^T n|^2
     if constexpr (kAxis == 0) {
-        square = sum_of_squares(sum_of_products(e.l21, ni, e.l31, nj), sum_of_products(e.l22, ni, e.l32, nj),
-                                hn::Mul(e.l33, nj));
+        const Float3 along{l.l21 * ni + l.l31 * nj, l.l22 * ni + l.l32 * nj, l.l33 * nj};
+        square = dot(along, along);
     } else if constexpr (kAxis == 1) {
-        square = sum_of_squares(sum_of_products(e.l31, ni, e.l11, nj), hn::Mul(e.l32, ni), hn::Mul(e.l33, ni));
+        const Float3 along{l.l31 * ni + l.l11 * nj, l.l32 * ni, l.l33 * ni};
+        square = dot(along, along);
     } else {
-        const Lanes u = sum_of_products(e.l11, ni, e.l21, nj), v = hn::Mul(e.l22, nj);
-        square = sum_of_products(u, u, v, v);
+        const Float u = l.l11 * ni + l.l21 * nj, v = l.l22 * nj;
+        square = u * u + v * v;
     }
-    const Lanes margin = hn::Add(set(point.slack), hn::Mul(set(kLaneMargin), entry_sum(e)));
-    const Lanes length = hn::Add(hn::Abs(ni), hn::Abs(nj));
-    const Lanes g = hn::Sub(hn::Sub(sum_of_products(ni, ri, nj, rj), hn::Sqrt(square)), hn::Mul(margin, length));
-    const auto misses = hn::And(hn::Gt(g, hn::Zero(d)), hn::Gt(length, set(kLaneDirection)));
-    const Lanes widened = hn::Add(half, margin);
-    const uint32_t line = ~bits_of(misses, first);
-    const uint32_t none_ahead = bits_of(hn::Lt(hn::Add(widened, rk), hn::Zero(d)), first);
-    const uint32_t none_behind = bits_of(hn::Lt(hn::Sub(widened, rk), hn::Zero(d)), first);
+    const Float margin = point.slack + kLaneMargin * entry_sum(l), length = abs(ni) + abs(nj);
+    const Float g = ni * ri + nj * rj - sqrt(square) - margin * length;
+    const Mask misses = (g > 0) & (length > kLaneDirection);
+    const Float widened = half + margin;
+    const uint32_t line = ~(bits(misses) << first);
+    const uint32_t none_ahead = bits(widened + rk < 0) << first, none_behind = bits(widened - rk < 0) << first;
     return {line & ~none_ahead, line & ~none_behind};
 }
 
@@ -85,7 +76,7 @@ template <size_t kAxis> HWY_INLINE AxisMask axis_lanes(const LaneNodes& e, const
 template <size_t kAxis>
 HWY_INLINE AxisMask axis_block(const std::byte* block, int32_t step_exponent, const LatticePoint& point) {
     AxisMask mask{0xff, 0xff};
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(LaneTag())) {
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
         const AxisMask part = axis_lanes<kAxis>(load_nodes(block, i, step_exponent), point, i);
         mask.ahead &= part.ahead, mask.behind &= part.behind;
     }

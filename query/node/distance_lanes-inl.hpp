@@ -45,14 +45,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
-using WideTag = hn::CappedTag<double, kBlockLanes>;
-
 /// Of each lane: the bound, in steps of the block's lattice, which is that along n, from the single to the lane; not
 /// positive if the nodes are not found apart. Lanes without a node have any.
 struct LaneBounds {
     alignas(64) double lower[kBlockLanes];
-    alignas(64) float x[kBlockLanes], y[kBlockLanes], z[kBlockLanes]; ///< n, of length 1 but for rounding
-    alignas(64) float size[kBlockLanes];                              ///< |L2|
+    alignas(64) float n[3][kBlockLanes]; ///< of length 1 but for rounding
+    alignas(64) float size[kBlockLanes]; ///< |L2|
     /// If boxes were given: how far the single reaches along n, and the lane along -n, from their centers; L1^T n and
     /// L2^T n, and their lengths.
     alignas(64) float reach_a[kBlockLanes], reach_b[kBlockLanes];
@@ -60,140 +58,111 @@ struct LaneBounds {
     uint32_t near; ///< bit i: lower[i] is not known to be `enough`
 };
 
-/// Bytes at any address, as floats.
-HWY_INLINE Lanes load_bytes(const std::byte* from) {
-#if HWY_TARGET == HWY_SCALAR
-    return hn::Set(LaneTag(), static_cast<float>(load_le<uint8_t>(from)));
-#else
-    const hn::Rebind<uint8_t, LaneTag> d8;
-    return hn::ConvertTo(LaneTag(), hn::PromoteTo(hn::Rebind<int32_t, LaneTag>(),
-                                                  hn::LoadU(d8, reinterpret_cast<const uint8_t*>(from))));
-#endif
-}
-
 /// The boxes of a block.
 struct LaneBoxes {
     const std::byte* block;
     float origin[3], step[3];
 
     HWY_INLINE explicit LaneBoxes(const std::byte* from) : block(from) {
-        for (size_t i = 0; i < 3; ++i) {
-            origin[i] = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
-            step[i] = std::bit_cast<float>((127 + int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)}) << 23);
-        }
+        const BlockBoxes boxes(from);
+        for (size_t i = 0; i < 3; ++i) origin[i] = static_cast<float>(boxes.origin(i)), step[i] = boxes.step(i);
     }
     /// Sides along an axis, from the box origin, of the lanes from `first` on.
-    HWY_INLINE Lanes low(size_t axis, size_t first) const { return side(kBlockBoxLow, axis, first); }
-    HWY_INLINE Lanes high(size_t axis, size_t first) const { return side(kBlockBoxHigh, axis, first); }
+    HWY_INLINE Float low(size_t axis, size_t first) const {
+        return box_sides(block, kBlockBoxLow, axis, first) * step[axis];
+    }
+    HWY_INLINE Float high(size_t axis, size_t first) const {
+        return box_sides(block, kBlockBoxHigh, axis, first) * step[axis];
+    }
     /// What the support of a lane's box may be wrong by.
     float slack() const {
         float sum = 0;
         for (size_t i = 0; i < 3; ++i) sum += std::abs(origin[i]) + (65535 + 255 * step[i]);
         return kBoxMargin * sum;
     }
-
-private:
-    HWY_INLINE Lanes side(size_t array, size_t axis, size_t first) const {
-        return hn::Mul(load_bytes(block + array + kBlockLanes * axis + first), hn::Set(LaneTag(), step[axis]));
-    }
 };
 
 /// How far a box reaches along -n, from its lane's center; n, and the center are of the lanes from `first` on.
-HWY_INLINE Lanes support(const LaneBoxes& boxes, size_t first, const LaneNodes& e, const LaneVector& n) {
-    const auto along = [&](size_t axis, Lanes center, Lanes component) {
-        const Lanes from = hn::Sub(hn::Set(LaneTag(), boxes.origin[axis]), center);
-        return hn::Min(hn::Mul(component, hn::Add(from, boxes.low(axis, first))),
-                       hn::Mul(component, hn::Add(from, boxes.high(axis, first))));
+HWY_INLINE Float support(const LaneBoxes& boxes, size_t first, const LaneNodes& e, const Float3& n) {
+    const auto along = [&](size_t axis, Float center, Float component) {
+        const Float from = boxes.origin[axis] - center;
+        return min(component * (from + boxes.low(axis, first)), component * (from + boxes.high(axis, first)));
     };
-    return hn::Neg(hn::Add(hn::Add(along(0, e.x, n.x), along(1, e.y, n.y)), along(2, e.z, n.z)));
+    return -(along(0, e.center.x, n.x) + along(1, e.center.y, n.y) + along(2, e.center.z, n.z));
 }
 /// How far the single's box reaches along n, from its ellipsoid's center.
-HWY_INLINE Lanes support(const PlacedBox& box, const LaneVector& n) {
-    const LaneTag d;
-    const auto along = [&](const float(&v)[4]) {
-        return dot(hn::Set(d, v[0]), hn::Set(d, v[1]), hn::Set(d, v[2]), n.x, n.y, n.z);
-    };
-    const Lanes sides =
-        hn::Add(hn::Add(hn::Abs(along(box.axis[0])), hn::Abs(along(box.axis[1]))), hn::Abs(along(box.axis[2])));
-    return hn::Add(along(box.center), sides);
+HWY_INLINE Float support(const PlacedBox& box, const Float3& n) {
+    const auto along = [&](size_t axis) { return abs(dot(set(box.axis[axis]), n)); };
+    return dot(set(box.center), n) + (along(0) + along(1) + along(2));
 }
-/// The lesser, and x for a NaN in y.
-HWY_INLINE Lanes lesser(Lanes x, Lanes y) {
-    return hn::IfThenElse(hn::Lt(y, x), y, x);
+
+/// The direction n of the bound; `size` is |L2|.
+HWY_INLINE Float3 bounding_direction(const LaneNodes& e, const Sym3& q2, Float size, const Single& one) {
+    const Float3 r = between(e, one);
+    const Float sizes = size + one.size;
+    const Float beyond = 1.7320508f * length(r) - sizes, excess = choose_or_zero(beyond > 0, beyond);
+    // Scaled so that the trace, |L1| + |L2| + excess, becomes 1.
+    const Float w2 = 1 / (size * (sizes + excess)), w1 = size * w2;
+    const Float3 n = adjugate(plus_diagonal(mixed(one, q2, w1, w2), 0.33333334f * (excess * w1))) * r;
+    return n * (1 / length(n));
+}
+
+/// What both bodies reach along n, in float, and their parts if the boxes are given, from lane `first` on.
+HWY_INLINE Float reach_of_both(const LaneNodes& e, Float size, const Float3& n, const Single& one, const PlacedBox* box,
+                               const LaneBoxes& boxes, size_t first, LaneBounds& out) {
+    const Float3 in_a = transposed_times(one, n), in_b = transposed_times(e.factor, n);
+    const Float width_a = length(in_a), width_b = length(in_b);
+    if (box == nullptr) return width_a + width_b + kLaneMargin * (size + one.size);
+    const Float a = lesser(width_a + kLaneMargin * set(one.size), support(*box, n) + box->slack);
+    const Float b = lesser(width_b + kLaneMargin * size, support(boxes, first, e, n) + boxes.slack());
+    store(a, out.reach_a + first), store(b, out.reach_b + first);
+    store(in_a, out.in_a, first), store(in_b, out.in_b, first);
+    store(width_a, out.width_a + first), store(width_b, out.width_b + first);
+    return a + b;
+}
+
+/// The bounds along out.n, in double: `reach` is what both bodies reach along it.
+HWY_INLINE void bound_along(const float (&center)[3][kBlockLanes], const float (&reach)[kBlockLanes], const Single& one,
+                            double enough, LaneBounds& out) {
+    const hn::Rebind<float, DoubleTag> narrow;
+    const double rounding = 0x1p-43 * (one.reach + double{kLargestCenter});
+    out.near = 0;
+    for (size_t i = 0; i < kBlockLanes; i += kDoubleLanes) {
+        const auto load = [&](const float* from) { return hn::PromoteTo(DoubleTag(), hn::Load(narrow, from + i)); };
+        const auto load3 = [&](const float(&rows)[3][kBlockLanes]) {
+            return Vector3<Double>{load(rows[0]), load(rows[1]), load(rows[2])};
+        };
+        const Vector3<Double> n = load3(out.n), c2 = load3(center);
+        const Vector3<Double> r{c2.x - one.exact[0], c2.y - one.exact[1], c2.z - one.exact[2]};
+        const Double square = dot(n, n), gap = dot(n, r) - load(reach) - rounding;
+        const Double tangent = (3 - square) * (0.5 - 0x1p-49);
+        const Double lower = gap * choose(square <= 1 + 0x1p-20, tangent, hn::Zero(DoubleTag()));
+        store(lower, out.lower + i);
+        out.near |= bits(DoubleTag(), hn::Not(lower >= enough)) << i;
+    }
 }
 
 /// `enough`: a bound that need not be improved, in steps. Without `box`, and that of the lanes, if it is null.
 HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const Single& one, const PlacedBox* box,
                             double enough, LaneBounds& out) {
-    const LaneTag d;
-    const auto set = [d](float value) { return hn::Set(d, value); };
-    alignas(64) float widths[kBlockLanes];
-    alignas(64) float cx[kBlockLanes], cy[kBlockLanes], cz[kBlockLanes];
+    alignas(64) float center[3][kBlockLanes], reach[kBlockLanes];
     const LaneBoxes boxes(block);
-    const Lanes margin = set(kLaneMargin), box_slack = set(boxes.slack());
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
         const LaneNodes e = load_nodes(block, i, step_exponent);
-        const LaneShapes q = shapes_of(e);
-        const LaneVector r = between(e, one);
-        const Lanes sizes = hn::Add(q.size, set(one.size));
-        const Lanes apart = hn::Mul(set(1.7320508f), hn::Sqrt(sum_of_squares(r.x, r.y, r.z)));
-        const Lanes beyond = hn::Sub(apart, sizes), excess = hn::IfThenElseZero(hn::Gt(beyond, hn::Zero(d)), beyond);
-        // Scaled so that the trace, |L1| + |L2| + excess, becomes 1.
-        const Lanes w2 = hn::Div(set(1), hn::Mul(q.size, hn::Add(sizes, excess)));
-        const Lanes w1 = hn::Mul(q.size, w2), round = hn::Mul(set(0.33333334f), hn::Mul(excess, w1));
-        LaneShapes mix = mixed(q, w1, w2, one);
-        mix.xx = hn::Add(mix.xx, round), mix.yy = hn::Add(mix.yy, round), mix.zz = hn::Add(mix.zz, round);
-        LaneVector n = adjugate_times(mix, r);
-        const Lanes scale = hn::Div(set(1), hn::Sqrt(sum_of_squares(n.x, n.y, n.z)));
-        n = {hn::Mul(n.x, scale), hn::Mul(n.y, scale), hn::Mul(n.z, scale)};
-        const LaneVector in_a = transposed_times(one, n), in_b = transposed_times(e, n);
-        const Lanes width_a = length(in_a), width_b = length(in_b);
-        if (box != nullptr) {
-            const Lanes a =
-                lesser(hn::Add(width_a, hn::Mul(margin, set(one.size))), hn::Add(support(*box, n), set(box->slack)));
-            const Lanes b =
-                lesser(hn::Add(width_b, hn::Mul(margin, q.size)), hn::Add(support(boxes, i, e, n), box_slack));
-            hn::Store(hn::Add(a, b), d, widths + i);
-            hn::Store(a, d, out.reach_a + i), hn::Store(b, d, out.reach_b + i);
-            hn::Store(in_a.x, d, out.in_a[0] + i), hn::Store(in_a.y, d, out.in_a[1] + i);
-            hn::Store(in_a.z, d, out.in_a[2] + i), hn::Store(in_b.x, d, out.in_b[0] + i);
-            hn::Store(in_b.y, d, out.in_b[1] + i), hn::Store(in_b.z, d, out.in_b[2] + i);
-            hn::Store(width_a, d, out.width_a + i), hn::Store(width_b, d, out.width_b + i);
-        } else {
-            hn::Store(hn::Add(hn::Add(width_a, width_b), hn::Mul(margin, sizes)), d, widths + i);
-        }
-        hn::Store(n.x, d, out.x + i), hn::Store(n.y, d, out.y + i), hn::Store(n.z, d, out.z + i);
-        hn::Store(e.x, d, cx + i), hn::Store(e.y, d, cy + i), hn::Store(e.z, d, cz + i);
-        hn::Store(q.size, d, out.size + i);
+        const Sym3 q2 = shape_of(e.factor);
+        const Float size = sqrt(trace(q2));
+        const Float3 n = bounding_direction(e, q2, size, one);
+        store(reach_of_both(e, size, n, one, box, boxes, i, out), reach + i);
+        store(n, out.n, i), store(e.center, center, i), store(size, out.size + i);
     }
-    const double rounding = 0x1p-43 * (one.reach + double{kLargestCenter});
-    out.near = 0;
-    const WideTag w;
-    const hn::Rebind<float, WideTag> narrow;
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(w)) {
-        const auto load = [&](const float* from) { return hn::PromoteTo(w, hn::Load(narrow, from + i)); };
-        const auto nx = load(out.x), ny = load(out.y), nz = load(out.z);
-        const auto rx = hn::Sub(load(cx), hn::Set(w, one.exact[0])), ry = hn::Sub(load(cy), hn::Set(w, one.exact[1]));
-        const auto rz = hn::Sub(load(cz), hn::Set(w, one.exact[2]));
-        const auto sum = [](auto a, auto b, auto c) { return hn::Add(hn::Add(a, b), c); };
-        const auto p = sum(hn::Mul(nx, rx), hn::Mul(ny, ry), hn::Mul(nz, rz));
-        const auto square = sum(hn::Mul(nx, nx), hn::Mul(ny, ny), hn::Mul(nz, nz));
-        const auto gap = hn::Sub(hn::Sub(p, load(widths)), hn::Set(w, rounding));
-        const auto tangent = hn::Mul(hn::Sub(hn::Set(w, 3.0), square), hn::Set(w, 0.5 - 0x1p-49));
-        const auto factor = hn::IfThenElse(hn::Le(square, hn::Set(w, 1 + 0x1p-20)), tangent, hn::Zero(w));
-        const auto lower = hn::Mul(gap, factor);
-        hn::Store(lower, w, out.lower + i);
-        uint8_t bits[8] = {};
-        hn::StoreMaskBits(w, hn::Not(hn::Ge(lower, hn::Set(w, enough))), bits);
-        out.near |= uint32_t{bits[0]} << i;
-    }
+    bound_along(center, reach, one, enough, out);
 }
 
 /// What hulls of the nodes (null: not known) add to a lane's bound along n, steps; never negative. The terms of their
 /// errors are those of hull_lanes-inl.hpp, and of the product above: that factor is at least 1 - 2^-20.
 HWY_INLINE double hulls_add(const LaneBounds& at, uint32_t lane, float size, const std::byte* hull_one,
                             const std::byte* hull_lane) {
-    const double x = at.x[lane], y = at.y[lane], z = at.z[lane];
+    const double x = at.n[0][lane], y = at.n[1][lane], z = at.n[2][lane];
     if (!(x * x + y * y + z * z <= 1 + 0x1p-20)) return 0; // nothing is claimed
     float saved = 0;
     if (hull_one != nullptr) {

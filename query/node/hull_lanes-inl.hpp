@@ -28,18 +28,15 @@ namespace prolate::query::HWY_NAMESPACE {
 
 /// hull_reach() of lanes.hpp, which has the same operations; v = {x, y, z}.
 HWY_INLINE float hull_reach_here(const std::byte* hull, float x, float y, float z, float width) {
-    const LaneTag d;
-    const hn::Rebind<int8_t, LaneTag> d8;
-    Lanes most = hn::Set(d, -HUGE_VALF);
-    for (size_t i = 0; i < kHullPoints; i += hn::Lanes(d)) {
-        const auto row = [&](size_t k) {
-            const auto* const from = reinterpret_cast<const int8_t*>(hull + kHullPoint + kHullPoints * k + i);
-            return hn::ConvertTo(d, hn::PromoteTo(hn::Rebind<int32_t, LaneTag>(), hn::LoadU(d8, from)));
-        };
-        most = hn::Max(most, dot(row(0), row(1), row(2), hn::Set(d, x), hn::Set(d, y), hn::Set(d, z)));
+    const float along[3] = {x, y, z};
+    const Float3 v = set(along);
+    Float most = set(-HUGE_VALF);
+    for (size_t i = 0; i < kHullPoints; i += kFloatLanes) {
+        const auto row = [&](size_t k) { return load_integers<int8_t>(hull + kHullPoint + kHullPoints * k + i); };
+        most = max(most, dot(Float3{row(0), row(1), row(2)}, v));
     }
     const auto share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
-    const float reach = hn::GetLane(hn::MaxOfLanes(d, most)) * kPerHullUnit + share * kPerHullShare * width;
+    const float reach = hn::GetLane(hn::MaxOfLanes(FloatTag(), most)) * kPerHullUnit + share * kPerHullShare * width;
     return share > 0 ? reach : width;
 }
 

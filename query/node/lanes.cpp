@@ -1,5 +1,7 @@
 #include "query/node/lanes.hpp"
 
+#include "src/block_box.hpp"
+
 #include <glm/mat3x3.hpp>
 
 #include <algorithm>
@@ -15,16 +17,12 @@ struct LaneBox {
     float center[3], half[3];
 };
 LaneBox box_of(const std::byte* block, uint32_t lane) {
+    const BlockBoxes boxes(block);
     LaneBox out;
     for (size_t i = 0; i < 3; ++i) {
-        const auto byte = [&](size_t array) {
-            return int32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
-        };
-        const int32_t low = byte(kBlockBoxLow), high = byte(kBlockBoxHigh);
-        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
-        const float half_step = std::bit_cast<float>((126 + exponent) << 23);
-        const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
-        out.center[i] = origin + static_cast<float>(low + high) * half_step;
+        const int32_t low = boxes.low(i, lane), high = boxes.high(i, lane);
+        const float half_step = boxes.half_step(i);
+        out.center[i] = static_cast<float>(boxes.origin(i)) + static_cast<float>(low + high) * half_step;
         out.half[i] = static_cast<float>(high - low) * half_step + (kBoxMargin * std::abs(out.center[i]) + kBoxSlack);
     }
     return out;
@@ -105,18 +103,15 @@ Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexc
 }
 
 bool boxes_apart(const std::byte* block, uint32_t lane, const Single& s, float margin) noexcept {
+    const BlockBoxes boxes(block);
     bool apart = false;
     for (size_t i = 0; i < 3; ++i) {
-        const auto byte = [&](size_t array) {
-            return int32_t{load_le<uint8_t>(block + array + kBlockLanes * i + lane)};
-        };
-        const auto origin = static_cast<float>(load_le<int32_t>(block + kBlockBoxOrigin + 4 * i));
-        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
-        const float per_step = std::bit_cast<float>((127 - exponent) << 23);
-        const float low = ((s.low[i] - margin) - origin) * per_step, high = ((s.high[i] + margin) - origin) * per_step;
+        const auto origin = static_cast<float>(boxes.origin(i));
+        const float low = ((s.low[i] - margin) - origin) * boxes.per_step(i),
+                    high = ((s.high[i] + margin) - origin) * boxes.per_step(i);
         const float least = std::min(low > 0 ? low + kAlmostOne : 0.0f, 256.0f);
         const float most = std::max(high < 255 ? high : 255.0f, -1.0f);
-        apart |= byte(kBlockBoxHigh) < static_cast<int32_t>(least) || byte(kBlockBoxLow) > static_cast<int32_t>(most);
+        apart |= boxes.high(i, lane) < static_cast<int32_t>(least) || boxes.low(i, lane) > static_cast<int32_t>(most);
     }
     return apart;
 }

@@ -47,75 +47,53 @@ namespace prolate::query::HWY_NAMESPACE {
 
 /// Lower bounds of the parameters at which the ray enters the boxes of lanes `first` and following; infinite if it does
 /// not before `limit` <= 1. NaN, which a ray that is not finite makes, is passed over.
-HWY_INLINE Lanes box_entries(const std::byte* block, size_t first, const BoxRay& ray, Lanes limit) {
-    const LaneTag d;
-    const auto side = [&](size_t at) {
-        const hn::Rebind<uint8_t, LaneTag> d8;
-        const auto bytes = hn::LoadU(d8, reinterpret_cast<const uint8_t*>(block + at + first));
-        return hn::ConvertTo(d, hn::PromoteTo(hn::Rebind<int32_t, LaneTag>(), bytes));
-    };
-    Lanes enter = hn::Zero(d), leave = limit;
+HWY_INLINE Float box_entries(const std::byte* block, size_t first, const BoxRay& ray, Float limit) {
+    Float enter = set(0), leave = limit;
     for (size_t i = 0; i < 3; ++i) {
-        const Lanes inverse = hn::Set(d, ray.inverse[i]);
-        const Lanes in = hn::Mul(hn::Sub(side(ray.near_side[i]), hn::Set(d, ray.near[i])), inverse);
-        const Lanes out = hn::Mul(hn::Sub(side(ray.far_side[i]), hn::Set(d, ray.far[i])), inverse);
-        enter = hn::IfThenElse(hn::Gt(in, enter), in, enter), leave = hn::IfThenElse(hn::Lt(out, leave), out, leave);
+        const auto side = [&](size_t array) { return box_sides(block, array, i, first); };
+        enter = greater(enter, (side(ray.near_side[i]) - ray.near[i]) * ray.inverse[i]);
+        leave = lesser(leave, (side(ray.far_side[i]) - ray.far[i]) * ray.inverse[i]);
     }
-    return hn::IfThenElse(hn::Gt(enter, leave), hn::Set(d, std::numeric_limits<float>::infinity()), enter);
+    return choose(enter > leave, set(std::numeric_limits<float>::infinity()), enter);
 }
 
 /// The ellipsoids, larger by a factor each. Rounding: u |L|, one of the 9 above more.
-HWY_INLINE LaneNodes grown(LaneNodes e, Lanes factor) {
-    for (Lanes* l : {&e.l11, &e.l21, &e.l22, &e.l31, &e.l32, &e.l33}) *l = hn::Mul(*l, factor);
-    return e;
+HWY_INLINE LaneNodes grown(const LaneNodes& e, Float factor) {
+    return {e.center, e.factor * factor};
+}
+
+/// A direction n that decides whether the ray meets the ellipsoids; `r` is c - o.
+HWY_INLINE Float3 entry_direction(const Lower3& l, const Float3& r, const Float3& span) {
+    // -y and v by forward substitution.
+    const Float i1 = 1 / l.l11, i2 = 1 / l.l22, i3 = 1 / l.l33;
+    const auto solve = [&](const Float3& x) {
+        const Float u = x.x * i1, v = (x.y - l.l21 * u) * i2;
+        return Float3{u, v, (x.z - l.l31 * u - l.l32 * v) * i3};
+    };
+    const Float3 y = solve(r), v = solve(span);
+    // z: nearest point of the line, drawn back to where it enters, or to the origin. All are negative like y.
+    const Float vv = dot(v, v), nearest = dot(y, v) / vv;
+    const Float3 m = y - v * nearest;
+    const Float inside = max(1 - dot(m, m), set(0)), back = sqrt(inside / vv);
+    const Float3 z = choose(nearest > back, m + v * back, y);
+    // n = -L^-T z by back substitution.
+    const Float nz = z.z * i3, ny = (z.y - l.l32 * nz) * i2;
+    return {(z.x - l.l21 * ny - l.l31 * nz) * i1, ny, nz};
 }
 
 /// Lower bounds of the parameters at which the ray enters the ellipsoids; infinite if certainly not before `limit`
 /// <= 1. kThick: ray.thickness is not 0.
-template <bool kThick> HWY_INLINE Lanes entry_lanes(const LaneNodes& e, const LatticeRay& ray, Lanes limit) {
-    const LaneTag d;
-    const auto set = [d](float value) { return hn::Set(d, value); };
-    const Lanes zero = hn::Zero(d), one = set(1), ex = set(ray.span[0]), ey = set(ray.span[1]), ez = set(ray.span[2]);
-    const Lanes rx = hn::Sub(e.x, set(ray.origin[0])), ry = hn::Sub(e.y, set(ray.origin[1])),
-                rz = hn::Sub(e.z, set(ray.origin[2]));
-    // -y and v by forward substitution.
-    const Lanes i1 = hn::Div(one, e.l11), i2 = hn::Div(one, e.l22), i3 = hn::Div(one, e.l33);
-    const auto solve = [&](Lanes x, Lanes y, Lanes z, Lanes& u, Lanes& v, Lanes& w) {
-        u = hn::Mul(x, i1);
-        v = hn::Mul(hn::Sub(y, hn::Mul(e.l21, u)), i2);
-        w = hn::Mul(hn::Sub(hn::Sub(z, hn::Mul(e.l31, u)), hn::Mul(e.l32, v)), i3);
-    };
-    Lanes y1, y2, y3, v1, v2, v3;
-    solve(rx, ry, rz, y1, y2, y3);
-    solve(ex, ey, ez, v1, v2, v3);
-    // z: nearest point of the line, drawn back to where it enters, or to the origin. All are negative like y.
-    const Lanes vv = sum_of_squares(v1, v2, v3);
-    const Lanes nearest = hn::Div(dot(y1, y2, y3, v1, v2, v3), vv);
-    const Lanes m1 = hn::Sub(y1, hn::Mul(nearest, v1)), m2 = hn::Sub(y2, hn::Mul(nearest, v2)),
-                m3 = hn::Sub(y3, hn::Mul(nearest, v3));
-    const Lanes inside = hn::Max(hn::Sub(one, sum_of_squares(m1, m2, m3)), zero);
-    const Lanes back = hn::Sqrt(hn::Div(inside, vv));
-    const auto ahead = hn::Gt(nearest, back);
-    const Lanes z1 = hn::IfThenElse(ahead, hn::Add(m1, hn::Mul(back, v1)), y1),
-                z2 = hn::IfThenElse(ahead, hn::Add(m2, hn::Mul(back, v2)), y2),
-                z3 = hn::IfThenElse(ahead, hn::Add(m3, hn::Mul(back, v3)), y3);
-    // n = -L^-T z by back substitution, and (1).
-    const Lanes nz = hn::Mul(z3, i3);
-    const Lanes ny = hn::Mul(hn::Sub(z2, hn::Mul(e.l32, nz)), i2);
-    const Lanes nx = hn::Mul(hn::Sub(hn::Sub(z1, hn::Mul(e.l21, ny)), hn::Mul(e.l31, nz)), i1);
-    const Lanes width = hn::Sqrt(sum_of_squares(dot(e.l11, e.l21, e.l31, nx, ny, nz),
-                                                sum_of_products(e.l22, ny, e.l32, nz), hn::Mul(e.l33, nz)));
-    const Lanes length = hn::Add(hn::Add(hn::Abs(nx), hn::Abs(ny)), hn::Abs(nz));
-    const Lanes margin = hn::Add(set(ray.slack), hn::Mul(set(kLaneMargin), entry_sum(e)));
-    Lanes g = hn::Sub(hn::Sub(dot(nx, ny, nz, rx, ry, rz), width), hn::Mul(margin, length));
-    if constexpr (kThick) g = hn::Sub(g, hn::Mul(set(ray.thickness), hn::Sqrt(sum_of_squares(nx, ny, nz))));
-    const Lanes along = dot(nx, ny, nz, ex, ey, ez);
+template <bool kThick> HWY_INLINE Float entry_lanes(const LaneNodes& e, const LatticeRay& ray, Float limit) {
+    const Float3 r = e.center - set(ray.origin), span = set(ray.span);
+    const Float3 n = entry_direction(e.factor, r, span);
+    const Float norm = one_norm(n);
+    Float g = dot(n, r) - width(e, n) - (ray.slack + kLaneMargin * entry_sum(e.factor)) * norm;
+    if constexpr (kThick) g = g - ray.thickness * length(n);
+    const Float along = dot(n, span);
     // Written so that a NaN gives 0, which claims nothing.
-    const auto sound = hn::Gt(length, set(kLaneDirection));
-    const auto positive = hn::And(sound, hn::Gt(g, zero));
-    const Lanes bound = hn::IfThenElse(hn::And(positive, hn::Gt(along, zero)), hn::Div(g, along), zero);
-    const auto misses = hn::And(positive, hn::Gt(g, hn::Mul(limit, along)));
-    return hn::IfThenElse(misses, set(std::numeric_limits<float>::infinity()), bound);
+    const Mask positive = (norm > kLaneDirection) & (g > 0);
+    const Float bound = choose(positive & (along > 0), g / along, set(0));
+    return choose(positive & (g > limit * along), set(std::numeric_limits<float>::infinity()), bound);
 }
 
 } // namespace prolate::query::HWY_NAMESPACE

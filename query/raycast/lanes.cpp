@@ -38,7 +38,9 @@ LatticeRay lattice_ray(const double origin[3], const double span[3], double reac
 float box_entry(const std::byte* block, uint32_t lane, const BoxRay& ray, float limit) noexcept {
     float enter = 0, leave = limit;
     for (size_t i = 0; i < 3; ++i) {
-        const auto side = [&](size_t at) { return static_cast<float>(load_le<uint8_t>(block + at + lane)); };
+        const auto side = [&](size_t at) {
+            return static_cast<float>(load_le<uint8_t>(block + at + kBlockLanes * i + lane));
+        };
         const float in = (side(ray.near_side[i]) - ray.near[i]) * ray.inverse[i];
         const float out = (side(ray.far_side[i]) - ray.far[i]) * ray.inverse[i];
         if (in > enter) enter = in;

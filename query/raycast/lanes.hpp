@@ -5,12 +5,10 @@
 #include "query/inside/axis_lanes.hpp"
 #include "query/node/lanes.hpp"
 
-#include "src/block.hpp"
-#include "src/bytes.hpp"
+#include "src/block_box.hpp"
 
 #include <prolate/tree.hpp>
 
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -31,23 +29,21 @@ LatticeRay lattice_ray(const double origin[3], const double span[3], double reac
 /// with `far` for the sides that it leaves through.
 struct BoxRay {
     float near[3], far[3], inverse[3];
-    size_t near_side[3], far_side[3]; ///< where the eight sides of each kind are in the block
+    size_t near_side[3], far_side[3]; ///< which of the block's sides they are: kBlockBoxLow or kBlockBoxHigh
 };
 inline BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
+    const BlockBoxes boxes(block);
     BoxRay out;
     for (size_t i = 0; i < 3; ++i) {
-        const auto exponent = int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)};
-        const auto step = std::bit_cast<float>((127 + exponent) << 23),
-                   per_step = std::bit_cast<float>((127 - exponent) << 23);
-        const double begin = load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
-        const auto origin = static_cast<float>(ray.origin[i] - begin);
+        const float per_step = boxes.per_step(i);
+        const auto origin = static_cast<float>(ray.origin[i] - static_cast<double>(boxes.origin(i)));
         const float wider = ray.thickness + (ray.slack + kLaneMargin * std::abs(origin));
         const bool forward = !(ray.inverse[i] < 0);
-        const size_t low = kBlockBoxLow + kBlockLanes * i, high = kBlockBoxHigh + kBlockLanes * i;
         out.near[i] = (forward ? origin + wider : origin - wider) * per_step;
         out.far[i] = (forward ? origin - wider : origin + wider) * per_step;
-        out.inverse[i] = ray.inverse[i] * step;
-        out.near_side[i] = forward ? low : high, out.far_side[i] = forward ? high : low;
+        out.inverse[i] = ray.inverse[i] * boxes.step(i);
+        out.near_side[i] = forward ? kBlockBoxLow : kBlockBoxHigh;
+        out.far_side[i] = forward ? kBlockBoxHigh : kBlockBoxLow;
     }
     return out;
 }

@@ -116,24 +116,23 @@ private:
         if (count > left()) return false;
         c_.stats.pair_tests += count, ++c_.stats.block_tests;
         c_.body.deepest = std::max(c_.body.deepest, first + count - 1);
-        const LaneTag d;
         alignas(32) float entries[kBlockLanes];
         const std::byte* const block = kGrown ? c_.body.tree.block(first / kBlockLanes) : c_.body.block(first);
         const int32_t step_exponent = c_.body.lattice.step_exponent;
-        const Lanes limit = hn::Set(d, limit_);
+        const Float limit = set(limit_);
         if constexpr (kGrown) {
-            for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
-                const LaneNodes nodes = grown(load_nodes(block, i, step_exponent), hn::LoadU(d, c_.growth + first + i));
-                hn::StoreU(entry_lanes<kThick>(nodes, c_.lattice_ray, limit), d, entries + i);
+            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+                const LaneNodes nodes =
+                    grown(load_nodes(block, i, step_exponent), load_unaligned(c_.growth + first + i));
+                store(entry_lanes<kThick>(nodes, c_.lattice_ray, limit), entries + i);
             }
         } else {
             const BoxRay boxes = box_ray(block, c_.lattice_ray);
-            for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
-                Lanes enter = box_entries(block, i, boxes, limit);
-                if (!hn::AllTrue(d, hn::Gt(enter, limit)))
-                    enter =
-                        hn::Max(enter, entry_lanes<kThick>(load_nodes(block, i, step_exponent), c_.lattice_ray, limit));
-                hn::StoreU(enter, d, entries + i);
+            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+                Float enter = box_entries(block, i, boxes, limit);
+                if (!all(enter > limit))
+                    enter = max(enter, entry_lanes<kThick>(load_nodes(block, i, step_exponent), c_.lattice_ray, limit));
+                store(enter, entries + i);
             }
         }
         for (uint32_t lane = 0; lane < count; ++lane) {

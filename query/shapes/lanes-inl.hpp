@@ -36,32 +36,22 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
 struct LaneGaps {
-    Lanes gap, key; ///< as ShapeGap
+    Float gap, key; ///< as ShapeGap
 };
 
 HWY_INLINE LaneGaps shape_gaps(const LaneNodes& e, const LaneRoundedBox& box) {
-    const LaneTag d;
-    const auto set = [d](float value) { return hn::Set(d, value); };
     const LaneTerms t = evaluate(e, box.single);
-    const auto along = [&](const float(&edge)[3]) {
-        return hn::Abs(dot(set(edge[0]), set(edge[1]), set(edge[2]), t.x, t.y, t.z));
-    };
-    const Lanes edges = hn::Add(hn::Add(along(box.edges[0]), along(box.edges[1])), along(box.edges[2]));
-    const Lanes round = hn::Mul(set(box.radius), hn::Sqrt(sum_of_squares(t.x, t.y, t.z)));
-    const Lanes sum = hn::Add(t.b, hn::Add(edges, round));
-    const Lanes slack = hn::Add(set(box.slack), hn::Mul(set(kLaneMargin), t.size));
-    const Lanes gap = hn::Sub(hn::Sub(t.p, sum), hn::Mul(slack, t.length));
-    return {hn::IfThenElse(hn::Gt(t.length, set(kLaneDirection)), gap, hn::Zero(d)), hn::Div(t.p, sum)};
+    const auto along = [&](size_t i) { return abs(dot(set(box.edges[i]), t.n)); };
+    const Float sum = t.b + (along(0) + along(1) + along(2) + box.radius * length(t.n));
+    const Float gap = t.p - sum - (box.slack + kLaneMargin * t.size) * t.one_norm;
+    return {choose(t.one_norm > kLaneDirection, gap, set(0)), t.p / sum};
 }
 
 HWY_INLINE LaneGaps shape_gaps(const LaneNodes& e, const LaneHalfSpace& half_space) {
-    const LaneTag d;
-    const auto set = [d](float value) { return hn::Set(d, value); };
-    const LaneVector n{set(half_space.normal[0]), set(half_space.normal[1]), set(half_space.normal[2])};
-    const Lanes height = hn::Sub(dot(n.x, n.y, n.z, e.x, e.y, e.z), set(half_space.offset)), wide = width(e, n);
-    const Lanes low = hn::Sub(height, wide);
-    const Lanes slack = hn::Add(set(half_space.slack), hn::Mul(set(kLaneMargin), shapes_of(e).size));
-    return {hn::Sub(low, slack), low};
+    const Float3 n = set(half_space.normal);
+    const Float low = dot(n, e.center) - half_space.offset - width(e, n);
+    const Float size = sqrt(trace(shape_of(e.factor)));
+    return {low - (half_space.slack + kLaneMargin * size), low};
 }
 
 /// Bit i: the boxes do not tell lane i apart from the shape.

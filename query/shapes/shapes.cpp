@@ -104,13 +104,12 @@ private:
         const std::byte* const block = q_.body.block(first);
         uint32_t meet = boxes_meet_shape(block, q_.lanes) & ((1u << count) - 1);
         if (meet == 0) return true;
-        const LaneTag d;
         alignas(32) float keys[kBlockLanes];
         uint32_t parted = 0;
-        for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+        for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
             const LaneGaps gaps = shape_gaps(load_nodes(block, i, q_.body.lattice.step_exponent), q_.lanes);
-            parted |= bits_of(hn::Gt(gaps.gap, hn::Zero(d)), i);
-            hn::StoreU(gaps.key, d, keys + i);
+            parted |= bits(gaps.gap > 0) << i;
+            store(gaps.key, keys + i);
         }
         meet &= ~parted;
         uint32_t deepest = size_;

@@ -38,17 +38,8 @@ struct LaneSpeeds {
     alignas(64) float rate[kBlockLanes], most_rate[kBlockLanes], curve[kBlockLanes];
 };
 
-HWY_INLINE LaneVector cross(const LaneVector& n, const float (&w)[3]) {
-    const LaneTag d;
-    const Lanes x = hn::Set(d, w[0]), y = hn::Set(d, w[1]), z = hn::Set(d, w[2]);
-    return {minor(n.y, z, n.z, y), minor(n.z, x, n.x, z), minor(n.x, y, n.y, x)};
-}
-
 HWY_INLINE void speed_lanes(const std::byte* block, int32_t step_exponent, const Single& one, const MotionFrame& frame,
                             const LaneBounds& bounds, LaneSpeeds& out) {
-    const LaneTag d;
-    const auto set = [d](float value) { return hn::Set(d, value); };
-    const auto length = [](const LaneVector& v) { return hn::Sqrt(sum_of_squares(v.x, v.y, v.z)); };
     float arm[3];
     double square = 0;
     for (size_t i = 0; i < 3; ++i) {
@@ -57,24 +48,17 @@ HWY_INLINE void speed_lanes(const std::byte* block, int32_t step_exponent, const
     }
     const float lever = static_cast<float>(std::sqrt(square)) + one.size;
     const float constant = frame.speed + frame.spin_y_length * lever + frame.spin_x_length * kLargestCenter;
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
         const LaneNodes e = load_nodes(block, i, step_exponent);
-        const LaneVector n{hn::Load(d, bounds.x + i), hn::Load(d, bounds.y + i), hn::Load(d, bounds.z + i)};
-        const LaneVector r{hn::Sub(e.x, set(frame.center_x[0])), hn::Sub(e.y, set(frame.center_x[1])),
-                           hn::Sub(e.z, set(frame.center_x[2]))};
-        const LaneVector mx = cross(n, frame.spin_x), my = cross(n, frame.spin_y);
-        const Lanes lever_x = hn::Add(length(r), hn::Load(d, bounds.size + i)), lever_y = set(lever);
-        const Lanes most_x = hn::Mul(length(mx), lever_x), most_y = hn::Mul(length(my), lever_y);
-        const Lanes straight =
-            hn::Add(dot(n.x, n.y, n.z, set(frame.velocity[0]), set(frame.velocity[1]), set(frame.velocity[2])),
-                    hn::Mul(set(kSpeedMargin), hn::Add(set(constant), hn::Mul(set(frame.spin_x_length), lever_x))));
-        const Lanes of_x = hn::Sub(width(e, mx), dot(mx.x, mx.y, mx.z, r.x, r.y, r.z));
-        const Lanes of_y = hn::Add(width(one, my), dot(my.x, my.y, my.z, set(arm[0]), set(arm[1]), set(arm[2])));
-        hn::Store(hn::Add(straight, hn::Add(of_x, of_y)), d, out.rate + i);
-        hn::Store(hn::Add(straight, hn::Add(most_x, most_y)), d, out.most_rate + i);
-        const Lanes curve =
-            hn::Add(hn::Mul(most_x, set(frame.spin_x_length)), hn::Mul(most_y, set(frame.spin_y_length)));
-        hn::Store(hn::Mul(curve, set(1 + kSpeedMargin)), d, out.curve + i);
+        const Float3 n = load(bounds.n, i), r = e.center - set(frame.center_x);
+        const Float3 mx = cross(n, set(frame.spin_x)), my = cross(n, set(frame.spin_y));
+        const Float lever_x = length(r) + load(bounds.size + i);
+        const Float most_x = length(mx) * lever_x, most_y = length(my) * lever;
+        const Float straight = dot(n, set(frame.velocity)) + kSpeedMargin * (constant + frame.spin_x_length * lever_x);
+        const Float of_x = width(e, mx) - dot(mx, r), of_y = width(one, my) + dot(my, set(arm));
+        store(straight + (of_x + of_y), out.rate + i);
+        store(straight + (most_x + most_y), out.most_rate + i);
+        store((most_x * frame.spin_x_length + most_y * frame.spin_y_length) * (1 + kSpeedMargin), out.curve + i);
     }
 }
 

@@ -1,11 +1,5 @@
-// All pairs of triangles of two leaves, four triangles of each at a time, packed densely into lanes. Compiled once an
-// instruction set.
-//
-// A's corners are taken from the first of the four's, B's from their own first, turned, and moved by what lies between
-// the two, which is computed in double; then all are scaled by the power of two that brings the greatest coordinate
-// into [1/2, 1). So the float tests lose digits in proportion to the leaves and what lies between them, not to the
-// bodies (how many: triangle_lanes-inl.hpp). Lanes are picked by index: pair p of n triangles of A and some of B is
-// (p mod n, p / n), so no lane but the last few is idle.
+// All pairs of triangles of two leaves: the float lanes answer for most, the scalar tests for what these leave open.
+// Compiled once for each instruction set; include it below <hwy/foreach_target.h>.
 #if defined(PROLATE_QUERY_TRIANGLE_LEAVES_INL) == defined(HWY_TARGET_TOGGLE)
 #ifdef PROLATE_QUERY_TRIANGLE_LEAVES_INL
 #undef PROLATE_QUERY_TRIANGLE_LEAVES_INL
@@ -13,8 +7,9 @@
 #define PROLATE_QUERY_TRIANGLE_LEAVES_INL
 #endif
 
-#include "query/triangle/lanes-inl.hpp"
-#include "src/bytes.hpp"
+#include "query/triangle/distance_lanes-inl.hpp"
+#include "query/triangle/fours-inl.hpp"
+#include "query/triangle/leaves.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -23,194 +18,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
-
-// Vectors of four. Nothing is read by longer vectors than it was written by, for that would have to wait until the
-// writes have reached the cache.
-constexpr size_t kFour = 4;
-using QuadTag = HWY_CAPPED(float, kFour);
-using Quad = hn::Vec<QuadTag>;
-
-// One to four triangles of a leaf, one a lane; row 3 i + k is coordinate k of corner i.
-class FourTriangles {
-public:
-    FourTriangles(const TreeView& tree, uint32_t first, uint32_t count) : count_(count) {
-        if (tree.vertex_count() <= 0x10000)
-            gather<uint16_t>(tree, first);
-        else
-            gather<uint32_t>(tree, first);
-        for (size_t k = 0; k < 3; ++k) origin_[k] = rows_[k][0];
-    }
-    uint32_t count() const { return count_; }
-    glm::dvec3 first_corner() const { return {origin_[0], origin_[1], origin_[2]}; }
-
-    /// Places the corners by x - first corner. Each lane of the result is the greatest of some of the coordinates.
-    Quad place() {
-        Quad most = hn::Zero(QuadTag());
-        for (size_t i = 0; i < kFour; i += step())
-            for (size_t row = 0; row < 9; ++row) most = hn::Max(most, set(row, i, from_first(row, i)));
-        return most;
-    }
-    /// Likewise by rotation (x - first corner) + shift.
-    Quad place(const glm::dmat3& rotation, const glm::dvec3& shift) {
-        Quad most = hn::Zero(QuadTag());
-        const auto rounded = [](double x) { return hn::Set(QuadTag(), static_cast<float>(x)); };
-        for (size_t i = 0; i < kFour; i += step())
-            for (size_t corner = 0; corner < 9; corner += 3) {
-                const Quad x = from_first(corner, i), y = from_first(corner + 1, i), z = from_first(corner + 2, i);
-                for (glm::length_t k = 0; k < 3; ++k) {
-                    const auto times = [&](glm::length_t column, Quad v) {
-                        return hn::Mul(rounded(rotation[column][k]), v);
-                    };
-                    const Quad turned = hn::Add(hn::Add(times(0, x), times(1, y)), times(2, z));
-                    most = hn::Max(most, set(corner + static_cast<size_t>(k), i, hn::Add(turned, rounded(shift[k]))));
-                }
-            }
-        return most;
-    }
-    void scale(float scale) {
-        for (size_t i = 0; i < kFour; i += step())
-            for (size_t row = 0; row < 9; ++row)
-                hn::Store(hn::Mul(at(row, i), hn::Set(QuadTag(), scale)), QuadTag(), scaled_[row] + i);
-    }
-    const float* row(size_t row) const { return scaled_[row]; }
-
-private:
-    static size_t step() { return hn::Lanes(QuadTag()); }
-
-    template <class Index> void gather(const TreeView& tree, uint32_t first) {
-        const std::byte* index = tree.triangle_bytes() + size_t{first} * 3 * sizeof(Index);
-        alignas(16) float corner[3][kFour][4] = {}; // the fourth coordinate means nothing
-        for (uint32_t i = 0; i < count_; ++i)
-            for (auto& of_all : corner) { // behind the vertices there are at least the 6 bytes of a triangle
-                load_le(tree.vertex_bytes() + size_t{load_le<Index>(index)} * 3 * sizeof(float), of_all[i]);
-                index += sizeof(Index);
-            }
-        for (size_t c = 0; c < 3; ++c) transpose(corner[c], 3 * c);
-    }
-    void transpose(const float (&corner)[kFour][4], size_t row) {
-#if HWY_TARGET == HWY_SCALAR
-        for (size_t k = 0; k < 3; ++k)
-            for (size_t i = 0; i < kFour; ++i) rows_[row + k][i] = corner[i][k];
-#else
-        const QuadTag d;
-        const Quad first = hn::Load(d, corner[0]), second = hn::Load(d, corner[1]), third = hn::Load(d, corner[2]),
-                   fourth = hn::Load(d, corner[3]);
-        const Quad odd = hn::InterleaveLower(d, first, third), even = hn::InterleaveLower(d, second, fourth);
-        hn::Store(hn::InterleaveLower(d, odd, even), d, rows_[row]);
-        hn::Store(hn::InterleaveUpper(d, odd, even), d, rows_[row + 1]);
-        hn::Store(hn::InterleaveLower(d, hn::InterleaveUpper(d, first, third), hn::InterleaveUpper(d, second, fourth)),
-                  d, rows_[row + 2]);
-#endif
-    }
-    Quad at(size_t row, size_t i) const {
-        return hn::Load(QuadTag(), rows_[row] + i);
-    }
-    Quad from_first(size_t row, size_t i) const {
-        return hn::Sub(at(row, i), hn::Set(QuadTag(), origin_[row % 3]));
-    }
-    // Returns the sizes of what it stores, 0 in lanes without a triangle.
-    Quad set(size_t row, size_t i, Quad x) {
-        hn::Store(x, QuadTag(), rows_[row] + i);
-        return hn::IfThenElseZero(hn::FirstN(QuadTag(), count_ > i ? count_ - i : 0), hn::Abs(x));
-    }
-
-    uint32_t count_;
-    float origin_[3];
-    alignas(16) float rows_[9][kFour], scaled_[9][kFour];
-};
-
-// The power of two that brings x > 0 into [1/2, 1); 0, with which nothing is certified, if there is none.
-inline float unit_scale(float x) {
-    const uint32_t exponent = std::bit_cast<uint32_t>(x) >> 23;
-    return exponent > 0 && exponent < 253 ? std::bit_cast<float>((253 - exponent) << 23) : 0;
-}
-
-inline float rounded_up(double x) {
-    return static_cast<float>(x * (1 + 0x1p-22));
-}
-
-// Which triangles the pairs are made of: of A's `count`, remainder[count - 1][pair], of B's, quotient[count - 1][pair].
-struct PairIndices {
-    static constexpr size_t kPairs = kFour * kFour;
-    int32_t remainder[kFour][kPairs], quotient[kFour][kPairs];
-};
-inline constexpr PairIndices kPairIndices = [] {
-    PairIndices out{};
-    for (size_t count = 1; count <= kFour; ++count)
-        for (size_t pair = 0; pair < PairIndices::kPairs; ++pair) {
-            out.remainder[count - 1][pair] = static_cast<int32_t>(pair % count);
-            out.quotient[count - 1][pair] = static_cast<int32_t>(std::min(pair / count, kFour - 1));
-        }
-    return out;
-}();
-
-/// The triangles of these indices, a vector of them; the last one if there are not so many.
-HWY_INLINE LaneTriangle pick(const FourTriangles& triangles, const int32_t* index) {
-    const LaneTag tag;
-    const hn::RebindToSigned<LaneTag> index_tag;
-    const auto which =
-        hn::Min(hn::LoadU(index_tag, index), hn::Set(index_tag, static_cast<int32_t>(triangles.count() - 1)));
-    const auto row_at = [&](size_t row) {
-        if constexpr (hn::MaxLanes(tag) < kFour)
-            return hn::GatherIndex(tag, triangles.row(row), which);
-        else
-            return hn::TableLookupLanes(hn::LoadDup128(tag, triangles.row(row)), hn::IndicesFromVec(tag, which));
-    };
-    return {{{row_at(0), row_at(1), row_at(2)}, {row_at(3), row_at(4), row_at(5)}, {row_at(6), row_at(7), row_at(8)}}};
-}
-
-/// One to four triangles of each leaf, placed where float lanes take them.
-class FourPair {
-public:
-    /// A's are placed already, which gave `most`.
-    FourPair(FourTriangles& a, Quad most, FourTriangles& b, const RelativePose& b_to_a) : a_(a), b_(b) {
-        const glm::dvec3 corner_a = a.first_corner(), corner_b = b.first_corner();
-        const glm::dvec3 shift = b_to_a.rotation * corner_b + (b_to_a.translation - corner_a);
-        const float largest = hn::GetLane(hn::MaxOfLanes(QuadTag(), hn::Max(most, b.place(b_to_a.rotation, shift))));
-        scale_ = unit_scale(largest);
-        a_.scale(scale_), b_.scale(scale_);
-        // Corners are no farther from the bodies' origins than the first ones and what lies between: the diagonals of
-        // cubes of `largest` and twice that.
-        reach_ = (glm::length(corner_a) + glm::length(corner_b) + 3 * 1.7321 * double{largest} + b_to_a.distance) *
-                 double{scale_};
-    }
-    /// Lanes' units in a metre; 0 if there is none.
-    double scale() const { return scale_; }
-    LaneMargins margins(double distance, const LaneMarginFactors& factors) const {
-        return {.direction = rounded_up(factors.direction + kSeparationMargin * reach_),
-                .corner_error = rounded_up(kPlacementError + 80 * 0x1p-53 * reach_),
-                .distance = rounded_up(distance * scale())};
-    }
-    uint32_t pairs() const { return a_.count() * b_.count(); }
-    /// Indices of the triangles of a pair.
-    uint32_t in_a(uint32_t pair) const { return static_cast<uint32_t>(of_a()[pair]); }
-    uint32_t in_b(uint32_t pair) const { return static_cast<uint32_t>(of_b()[pair]); }
-    /// The triangles of the pairs from `pair` on.
-    HWY_INLINE LaneTriangle lanes_a(size_t pair) const { return pick(a_, of_a() + pair); }
-    HWY_INLINE LaneTriangle lanes_b(size_t pair) const { return pick(b_, of_b() + pair); }
-
-private:
-    const int32_t* of_a() const { return kPairIndices.remainder[a_.count() - 1]; }
-    const int32_t* of_b() const { return kPairIndices.quotient[a_.count() - 1]; }
-
-    FourTriangles &a_, &b_;
-    float scale_;
-    double reach_;
-};
-
-/// Calls visit(pair, first of A, first of B) for all fours of the leaves until it returns true.
-template <class Visit>
-HWY_INLINE void any_four_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
-                              const RelativePose& b_to_a, Visit&& visit) {
-    for (uint32_t i = 0; i < in_a.count; i += kFour) {
-        FourTriangles four_a(a, in_a.first + i, std::min<uint32_t>(in_a.count - i, kFour));
-        const Quad most = four_a.place();
-        for (uint32_t j = 0; j < in_b.count; j += kFour) {
-            FourTriangles four_b(b, in_b.first + j, std::min<uint32_t>(in_b.count - j, kFour));
-            if (visit(FourPair(four_a, most, four_b, b_to_a), in_a.first + i, in_b.first + j)) return;
-        }
-    }
-}
 
 inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                                  const RelativePose& b_to_a, double distance, const LaneMarginFactors& factors) {
@@ -238,6 +45,59 @@ inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const Tr
         return false;
     });
     return result;
+}
+
+inline LeafDistance distance_of_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                                          const RelativePose& b_to_a, NearLimit limit, glm::dvec3 normal,
+                                          const LaneMarginFactors& factors) {
+    LeafDistance out;
+    any_four_pair(a, in_a, b, in_b, b_to_a, [&](const FourPair& fours, uint32_t first_a, uint32_t first_b) {
+        const LaneMargins margins = fours.margins(0, factors);
+        const double scale = fours.scale();
+        const auto metres = [scale](float x) { return scale > 0 ? double{x} / scale : 0; };
+        for (uint32_t pair = 0; pair < fours.pairs(); pair += kLanes) {
+            const auto count = std::min<uint32_t>(fours.pairs() - pair, kLanes);
+            const TriangleBounds bounds =
+                bound_all_lanes([&](size_t lane) { return fours.lanes_a(pair + lane); },
+                                [&](size_t lane) { return fours.lanes_b(pair + lane); }, margins,
+                                rounded_up(std::min(limit.distance * scale, double{kFarLimit})), count);
+            out.pair_tests += count;
+            for (uint32_t left = (1u << count) - 1; left != 0;) {
+                auto lane = static_cast<uint32_t>(std::countr_zero(left)); // the nearest first
+                for (uint32_t rest = left & (left - 1); rest != 0; rest &= rest - 1) {
+                    const auto other = static_cast<uint32_t>(std::countr_zero(rest));
+                    if (bounds.lower[other] < bounds.lower[lane]) lane = other;
+                }
+                left &= ~(1u << lane);
+                const double lower = metres(bounds.lower[lane]);
+                if (lower >= limit.distance) { // so are the rest
+                    out.lower = std::min(out.lower, lower);
+                    break;
+                }
+                const uint32_t i = first_a + fours.in_a(pair + lane), j = first_b + fours.in_b(pair + lane);
+                const PlacedTriangle x = query::place(a, i), y = query::place(b, j, b_to_a);
+                const double along = gap_along(x, y, normal);
+                if (along >= limit.distance) {
+                    out.lower = std::min(out.lower, along);
+                    continue;
+                }
+                ++out.exact_tests;
+                const TriangleDistance exact = distance(x, y);
+                out.lower = std::min(out.lower, exact.lower);
+                const bool meet = !(exact.lower > 0);
+                if (exact.upper < out.nearest.upper || meet) {
+                    out.nearest = exact, out.triangle_a = i, out.triangle_b = j;
+                    limit.lower(exact.upper);
+                    const glm::dvec3 between = exact.on_b - exact.on_a;
+                    const double length = glm::length(between);
+                    if (length > 0) normal = between / length;
+                }
+                if (meet) return true;
+            }
+        }
+        return false;
+    });
+    return out;
 }
 
 } // namespace prolate::query::HWY_NAMESPACE

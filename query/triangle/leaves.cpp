@@ -4,7 +4,6 @@
 #define HWY_TARGET_INCLUDE "query/triangle/leaves.cpp"
 #include <hwy/foreach_target.h>
 
-#include "query/triangle/distance_lanes-inl.hpp"
 #include "query/triangle/leaves-inl.hpp"
 
 #if HWY_ONCE

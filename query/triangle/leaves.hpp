@@ -1,9 +1,10 @@
 // Two leaves of exact trees: does a triangle of one meet a triangle of the other, and how far are they apart? Float
 // kernels answer for eight pairs at once; what they leave open the scalar tests of triangle.hpp and
-// triangle_distance.hpp decide.
+// distance.hpp decide.
 #pragma once
 
 #include "query/triangle/distance.hpp"
+#include "query/triangle/lanes.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -11,35 +12,6 @@
 #include <limits>
 
 namespace prolate::query {
-
-inline constexpr size_t kLanes = 8;
-
-/// What the float tests demand beyond zero (triangle_lanes-inl.hpp), in the lanes' unit: the greatest coordinate of a
-/// corner lies in [1/2, 1).
-struct LaneMargins {
-    float direction;    // of a separating direction n, times |n|_1
-    float corner_error; // a coordinate of a corner is wrong by no more
-    float distance;     // triangles are apart only if farther than this
-};
-/// Their parts that do not depend on the leaves. The tests give others, to show that wrong ones are caught.
-struct LaneMarginFactors {
-    float direction = 0x1p-18f; // 64 u, u = 2^-24
-    float volume = 0x1p-17f;    // 128 u
-};
-
-/// What the placement of corners in float costs, of the lanes' unit: 24 u.
-inline constexpr float kPlacementError = 0x1.8p-20f;
-
-/// A bit a lane. Neither: not known.
-struct LaneVerdicts {
-    uint32_t apart; // no common point, more than margins.distance apart
-    uint32_t meet;  // a common point
-};
-
-/// Triangles, one a lane: row 3 i + k is coordinate k of corner i.
-struct TriangleRows {
-    float row[9][kLanes];
-};
 
 struct LeafResult {
     bool meet = false;                        // some two are not certainly more than `distance` apart
@@ -69,12 +41,6 @@ struct NearLimit {
 LeafDistance distance_of_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                                 const RelativePose& b_to_a, NearLimit limit = {}, const glm::dvec3& normal = {0, 0, 0},
                                 const LaneMarginFactors& factors = {}) noexcept;
-
-/// In the lanes' unit, in which no two are farther apart than kFarLimit.
-struct TriangleBounds {
-    float lower[kLanes];
-};
-inline constexpr float kFarLimit = 16;
 
 /// The kernels alone, for the tests and benchmarks: a call a vector costs more than they do.
 LaneVerdicts test_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,

@@ -26,17 +26,16 @@ namespace prolate::query::HWY_NAMESPACE {
 
 // All eight lanes as lane_gap() gives one; bit i of the result: lane i is separated.
 uint32_t lane_gaps(const std::byte* block, int32_t step_exponent, const Single& single, LaneGap out[kBlockLanes]) {
-    const LaneTag d;
-    uint32_t bits = 0;
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+    uint32_t separated_lanes = 0;
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
         const LaneTerms t = evaluate(load_nodes(block, i, step_exponent), single);
-        bits |= bits_of(separated<false>(t, hn::Zero(d)), i);
+        separated_lanes |= bits(separated<false>(t, set(0))) << i;
         alignas(32) float gap[kBlockLanes], square[kBlockLanes], depth[kBlockLanes], size[kBlockLanes];
-        hn::StoreU(t.gap, d, gap), hn::StoreU(sum_of_squares(t.x, t.y, t.z), d, square);
-        hn::StoreU(hn::Div(t.p, t.sum), d, depth), hn::StoreU(t.size, d, size);
-        for (size_t k = 0; k < hn::Lanes(d); ++k) out[i + k] = {gap[k], square[k], depth[k], size[k]};
+        store(t.gap, gap), store(dot(t.n, t.n), square);
+        store(t.p / t.sum, depth), store(t.size, size);
+        for (size_t k = 0; k < kFloatLanes; ++k) out[i + k] = {gap[k], square[k], depth[k], size[k]};
     }
-    return bits;
+    return separated_lanes;
 }
 
 uint32_t box_bits(const std::byte* block, const Single& single, float margin) {

@@ -32,19 +32,17 @@ AxisMask block_mask(const std::byte* block, int32_t step_exponent, const Lattice
 
 void block_entries(const std::byte* block, int32_t step_exponent, const LatticeRay& ray, float limit,
                    float entries[kBlockLanes]) {
-    const LaneTag d;
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
         const LaneNodes nodes = load_nodes(block, i, step_exponent);
-        hn::StoreU(ray.thickness > 0 ? entry_lanes<true>(nodes, ray, hn::Set(d, limit))
-                                     : entry_lanes<false>(nodes, ray, hn::Set(d, limit)),
-                   d, entries + i);
+        store_unaligned(ray.thickness > 0 ? entry_lanes<true>(nodes, ray, set(limit))
+                                          : entry_lanes<false>(nodes, ray, set(limit)),
+                        entries + i);
     }
 }
 
 void block_box_entries(const std::byte* block, const BoxRay& ray, float limit, float entries[kBlockLanes]) {
-    const LaneTag d;
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d))
-        hn::StoreU(box_entries(block, i, ray, hn::Set(d, limit)), d, entries + i);
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
+        store_unaligned(box_entries(block, i, ray, set(limit)), entries + i);
 }
 
 } // namespace prolate::query::HWY_NAMESPACE

@@ -32,12 +32,11 @@ namespace prolate::query::HWY_NAMESPACE {
 
 template <class Shape>
 void block_gaps(const std::byte* block, int32_t step_exponent, const Shape& shape, ShapeGap* out) {
-    const LaneTag d;
-    for (size_t i = 0; i < kBlockLanes; i += hn::Lanes(d)) {
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
         const LaneGaps gaps = shape_gaps(load_nodes(block, i, step_exponent), shape);
         float gap[kBlockLanes], key[kBlockLanes];
-        hn::StoreU(gaps.gap, d, gap), hn::StoreU(gaps.key, d, key);
-        for (size_t k = 0; k < hn::Lanes(d); ++k) out[i + k] = {gap[k], key[k]};
+        store_unaligned(gaps.gap, gap), store_unaligned(gaps.key, key);
+        for (size_t k = 0; k < kFloatLanes; ++k) out[i + k] = {gap[k], key[k]};
     }
 }
 void box_gaps(const std::byte* block, int32_t step_exponent, const LaneRoundedBox& box, ShapeGap* out) {
