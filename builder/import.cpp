@@ -53,8 +53,7 @@ Result<std::string> read_all(const char* path) {
     struct stat status {};
     if (::fstat(file.fd, &status) != 0) return io("cannot read the file");
     if (S_ISDIR(status.st_mode)) return Error{ErrorCode::io, "cannot read the file", EISDIR};
-    if (!S_ISREG(status.st_mode)) // Assimp opens the name a second time
-        return Error{ErrorCode::io, "a mesh can only be read from a regular file", ESPIPE};
+    if (!S_ISREG(status.st_mode)) return Error{ErrorCode::io, "a mesh can only be read from a regular file", ESPIPE};
     std::string bytes(static_cast<size_t>(status.st_size), '\0');
     size_t have = 0;
     while (have < bytes.size()) {
@@ -74,47 +73,34 @@ std::string words(const char* format, auto... values) {
     return out;
 }
 
-// What Assimp 5.2 does not notice: polygons with holes; indices that are not numbers, over which it runs on one place,
-// and takes more memory, for ever; and negative ones, which it takes for 0 (only those of weights may be negative).
-Result<void> check_collada(std::string_view text) {
-    if (text.find("<ph>") != text.npos)
-        return Error{ErrorCode::bad_file, "polygons with holes (<ph>), which are not read; export triangles"};
-    for (const std::string_view name : {"<p", "<v", "<vcount"})
-        for (size_t at = text.find(name); at != text.npos; at = text.find(name, at + 1)) {
-            const size_t end_of_name = at + name.size();
-            if (end_of_name == text.size() || std::string_view("> \t\r\n").find(text[end_of_name]) == text.npos)
-                continue; // a longer name
-            const size_t begin = text.find('>', end_of_name);
-            if (begin == text.npos) break;
-            if (text[begin - 1] == '/') continue; // <p/>
-            // To the end of the element: other markup inside is no list either.
-            const std::string_view list = text.substr(begin + 1, text.find("</", begin) - begin - 1);
-            const size_t bad = list.find_first_not_of(name == "<v" ? "-0123456789 \t\r\n" : "0123456789 \t\r\n");
-            if (bad != list.npos) return Error{ErrorCode::bad_file, "indices that are not numbers", begin + 1 + bad};
-        }
-    return {};
+using Reader = Result<Polygons> (*)(std::string_view bytes, std::string& detail);
+
+// Of the formats that are one file.
+Reader reader_of(std::string_view type) {
+    static constexpr std::pair<std::string_view, Reader> kReaders[] = {
+        {".obj", read_obj}, {".off", read_off}, {".ply", read_ply},     {".stl", read_stl},
+        {".3mf", read_3mf}, {".3ds", read_3ds}, {".dae", read_collada},
+    };
+    for (const auto& [known, reader] : kReaders)
+        if (known == type) return reader;
+    return nullptr;
 }
 
 Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
     const std::string type = extension(path);
-    constexpr std::string_view kTexts[] = {".obj", ".off", ".ply", ".stl"};
-    const bool is_own = std::find(std::begin(kTexts), std::end(kTexts), type) != std::end(kTexts);
-    const bool is_gltf = type == ".gltf" || type == ".glb", is_assimps = type == ".dae" || type == ".3ds";
     const auto bytes = read_all(path.c_str());
     if (!bytes) return bytes.error();
-    if (!is_own && !is_gltf && !is_assimps && type != ".3mf")
-        return Error{ErrorCode::bad_file, "unknown kind of mesh file"};
-    if (bytes->empty()) return Error{ErrorCode::bad_file, "the file is empty"};
-    if (bytes->starts_with("\xFF\xFE") || bytes->starts_with("\xFE\xFF"))
+    const bool is_gltf = type == ".gltf" || type == ".glb";
+    const Reader reader = reader_of(type);
+    if (!reader && !is_gltf) return Error{ErrorCode::bad_file, "unknown kind of mesh file"};
+    std::string_view content = *bytes;
+    if (content.empty()) return Error{ErrorCode::bad_file, "the file is empty"};
+    if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF"))
         return Error{ErrorCode::bad_file, "text in UTF-16; save it as UTF-8"};
-    if (bytes->starts_with("version https://git-lfs"))
+    if (content.starts_with("version https://git-lfs"))
         return Error{ErrorCode::bad_file, "a pointer of Git LFS, not the file itself; fetch it with 'git lfs pull'"};
-    if (is_own) return read_text_or_binary(type, *bytes, detail);
-    if (is_gltf) return read_gltf(type, *bytes, path, detail);
-    if (type == ".3mf") return read_3mf(*bytes, detail);
-    if (type == ".dae")
-        if (const auto fit = check_collada(*bytes); !fit) return fit.error();
-    return read_with_assimp(type, path, detail);
+    if (content.starts_with("\xEF\xBB\xBF")) content.remove_prefix(3); // the mark of UTF-8
+    return is_gltf ? read_gltf(type, content, path, detail) : reader(content, detail);
 }
 
 struct Extent {
@@ -152,9 +138,6 @@ double spacing(double coordinate) {
 Result<Placement> place(Polygons& polygons, const ImportOptions& options, ImportReport& report) {
     Placement placement;
     for (size_t k = 0; k < 3; ++k) placement.scale[k] = options.unit.value_or(polygons.unit) * options.scale[k];
-    const double read_spacing = spacing(Extent(polygons.points, polygons.corners).largest());
-    double largest_scale = 0;
-    for (const double s : placement.scale) largest_scale = std::max(largest_scale, std::abs(s));
     for (Point& p : polygons.points)
         for (size_t k = 0; k < 3; ++k) p[k] *= placement.scale[k];
     const Extent there(polygons.points, polygons.corners);
@@ -170,18 +153,9 @@ Result<Placement> place(Polygons& polygons, const ImportOptions& options, Import
             words("taken around a local origin, (%.12g, %.12g, %.12g): all coordinates are relative to it",
                   placement.origin[0], placement.origin[1], placement.origin[2]));
     }
-    const auto lost = [&](double moved) {
-        return words("points would move by %.2g m, and the mesh is %.3g m across", moved, diagonal);
-    };
-    if (polygons.points_are_rounded && diagonal > 0 && read_spacing * largest_scale > kMostRounding * diagonal) {
-        report.detail = lost(read_spacing * largest_scale / 2);
-        return Error{ErrorCode::bad_mesh,
-                     "the mesh lies too far from (0, 0, 0) for the single precision that this format "
-                     "is read in; move it there, or export it as OBJ"};
-    }
     const double step = spacing(Extent(polygons.points, polygons.corners).largest());
     if (diagonal > 0 && step > kMostRounding * diagonal) {
-        report.detail = lost(step / 2);
+        report.detail = words("points would move by %.2g m, and the mesh is %.3g m across", step / 2, diagonal);
         return Error{
             ErrorCode::bad_mesh,
             "the mesh lies too far from (0, 0, 0) for single precision; give it a local origin with --recentre"};
@@ -284,7 +258,7 @@ std::optional<uint64_t> hash_mesh_file(const char* path, const ImportOptions& op
     const double taken[] = {
         options.unit.value_or(0),   options.scale[0], options.scale[1], options.scale[2], options.recentre ? 1.0 : 0.0,
         options.origin ? 1.0 : 0.0, origin[0],        origin[1],        origin[2]};
-    const uint64_t reader[] = {assimp_version(), kBuilderVersion, hash_bytes(std::as_bytes(std::span(type)))};
+    const uint64_t reader[] = {kBuilderVersion, hash_bytes(std::as_bytes(std::span(type)))};
     const uint64_t how = hash_bytes(std::as_bytes(std::span(taken)), hash_bytes(std::as_bytes(std::span(reader))));
     return hash_bytes(std::as_bytes(std::span(*bytes)), how);
 } catch (const std::bad_alloc&) {

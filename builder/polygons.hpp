@@ -36,11 +36,11 @@ struct Affine {
         for (size_t i = 0; i < 3; ++i) out[i] = m[i][0] * p[0] + m[i][1] * p[1] + m[i][2] * p[2] + m[i][3];
         return out;
     }
-    bool mirrors() const {
+    double determinant() const {
         return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-                   m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
-               0;
+               m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     }
+    bool mirrors() const { return determinant() < 0; }
 };
 
 /// Faces of three or more corners, counter-clockwise seen from outside, over shared points.
@@ -51,10 +51,9 @@ struct Polygons {
     std::vector<uint32_t> places;  ///< where each face stands: its line or number, see `place_word`. Empty: its number
     const char* place_word = "face";
 
-    double unit = 1;                 ///< metres of one of the file's units, where the format defines it
-    bool unit_is_ignored = false;    ///< the file states one other than metres, which is not applied
-    bool points_are_rounded = false; ///< the reader has single precision where the file may have more
-    std::vector<std::string> notes;  ///< one line each: what the file states and what was done about it
+    double unit = 1;                ///< metres of one of the file's units, where the format defines it
+    bool unit_is_ignored = false;   ///< the file states one other than metres, which is not applied
+    std::vector<std::string> notes; ///< one line each: what the file states and what was done about it
 
     /// Starts a face; its corners are then added.
     void begin_face(uint64_t place) {
@@ -74,15 +73,18 @@ struct Polygons {
     }
 };
 
-/// The readers, each of its formats' bytes. They fail with bad_file; `detail` then says the place (a line, for text).
-/// Linear in the size of what they read. `type` is the name's extension in lower case, with the dot.
-Result<Polygons> read_text_or_binary(std::string_view type, std::string_view bytes, std::string& detail);
+/// The readers, each of its format's bytes. They fail with bad_file; `detail` then says the place (a line, for text).
+/// Linear in the size of what they read and make. They pass through checkpoint(), so they may throw Cancelled.
+Result<Polygons> read_obj(std::string_view bytes, std::string& detail);
+Result<Polygons> read_off(std::string_view bytes, std::string& detail);
+Result<Polygons> read_ply(std::string_view bytes, std::string& detail);
+Result<Polygons> read_stl(std::string_view bytes, std::string& detail);
+Result<Polygons> read_3ds(std::string_view bytes, std::string& detail);
+Result<Polygons> read_collada(std::string_view bytes, std::string& detail);
+Result<Polygons> read_3mf(std::string_view bytes, std::string& detail);
+/// `type` is the name's extension in lower case, with the dot; other files are sought beside `path`.
 Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path, std::string& detail);
 /// The JSON of a glTF or GLB file; empty if there is none.
 std::string_view gltf_json(std::string_view type, std::string_view bytes);
-Result<Polygons> read_3mf(std::string_view bytes, std::string& detail);
-Result<Polygons> read_with_assimp(std::string_view type, const std::string& path, std::string& detail);
-/// Of the library that reads files of this type: part of what a mesh depends on.
-uint64_t assimp_version();
 
 } // namespace prolate

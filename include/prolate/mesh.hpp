@@ -97,7 +97,7 @@ struct ImportReport {
 };
 
 /// Reads every mesh of a scene, with its transforms: OBJ, PLY, STL, OFF, glTF/GLB, 3MF, 3DS, DAE (by the name's
-/// extension). Positions are read in double precision where the file has it (not of DAE), placed as `options` say, and
+/// extension). Positions are read in double precision where the file has it, placed as `options` say, and
 /// only then rounded to float. Mirroring transforms and scales turn the faces.
 ///
 /// Polygons, concave ones too, are cut into triangles that tile them exactly; if one is not flat, these triangles are

@@ -3,7 +3,7 @@
 # Uses prolate as its users do: builds tests/project/consumer, bakes a cube and queries it.
 #   installed     installs BUILD, a finished build, and finds the package
 #   subdirectory  adds ROOT with add_subdirectory()
-#   query_only    builds and installs ROOT where Eigen, Assimp and oneTBB cannot be found, proves that the compiler
+#   query_only    builds and installs ROOT where Eigen, pugixml and oneTBB cannot be found, proves that the compiler
 #                 opened none of their headers, and finds the package there; needs the trees that `installed` baked
 # What is installed is compared with include/prolate: a header that was added cannot be forgotten. Each is compiled
 # alone, and each that README's table names is used.
@@ -62,7 +62,7 @@ set(consumer ${CMAKE_CURRENT_LIST_DIR}/consumer)
 set(programs ${WORK}/${HOW})
 set(prefix ${WORK}/${HOW}-prefix)
 set(baked ${WORK}/baked)
-set(without_builder_libraries -D CMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON -D CMAKE_DISABLE_FIND_PACKAGE_assimp=ON
+set(without_builder_libraries -D CMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON -D CMAKE_DISABLE_FIND_PACKAGE_pugixml=ON
   -D CMAKE_DISABLE_FIND_PACKAGE_TBB=ON)
 file(REMOVE_RECURSE ${prefix}) # files of an earlier install must not help
 

@@ -70,13 +70,13 @@ plant(bad query/unknown/planted.cpp "#include \"query/simd/targets.hpp\"")
 plant(good query/contacts/planted.cpp "#include \"query/collide/search.hpp\"")
 plant(good query/distance/planted.cpp "#include \"query/distance/search.hpp\"")
 plant(good query/world/planted.cpp "#include \"query/inside/inside.hpp\"")
-# builder knows neither query nor GLM; Assimp only in import.cpp.
+# builder knows neither query nor GLM; pugixml is for the reader of DAE only.
 plant(bad builder/planted.cpp "#include <prolate/query.hpp>")
 plant(bad builder/planted.cpp "#include \"query/ellipsoid/separation.hpp\"")
 plant(bad builder/planted.cpp "#include <glm/vec3.hpp>")
 plant(bad builder/planted.cpp "#include <prolate/glm.hpp>")
-plant(bad builder/planted.cpp "#include <assimp/scene.h>")
-plant(good builder/import_assimp.cpp "#include <assimp/scene.h>")
+plant(bad builder/planted.cpp "#include <pugixml.hpp>")
+plant(good builder/import_collada.cpp "#include <pugixml.hpp>")
 plant(good builder/planted.cpp "#include <Eigen/Dense>")
 plant(good builder/planted.cpp "#include <prolate/verify.hpp>")
 # src knows neither side.
