@@ -1,5 +1,6 @@
 // load_mesh(): from a file to a mesh. Each format has its reader (polygons.hpp), which gives polygons in double
 // precision; here they are placed, rounded to float, and cut into triangles.
+#include "builder/job.hpp"
 #include "builder/polygons.hpp"
 #include "builder/triangulate.hpp"
 
@@ -41,32 +42,6 @@ std::string extension(const std::string& path) {
     return out;
 }
 
-Result<std::string> read_all(const char* path) {
-    struct Closer {
-        int fd;
-        ~Closer() {
-            if (fd >= 0) ::close(fd);
-        }
-    };
-    const Closer file{::open(path, O_RDONLY | O_CLOEXEC)};
-    if (file.fd < 0) return io("cannot open the file");
-    struct stat status {};
-    if (::fstat(file.fd, &status) != 0) return io("cannot read the file");
-    if (S_ISDIR(status.st_mode)) return Error{ErrorCode::io, "cannot read the file", EISDIR};
-    if (!S_ISREG(status.st_mode)) return Error{ErrorCode::io, "a mesh can only be read from a regular file", ESPIPE};
-    std::string bytes(static_cast<size_t>(status.st_size), '\0');
-    size_t have = 0;
-    while (have < bytes.size()) {
-        const ssize_t n = ::read(file.fd, bytes.data() + have, bytes.size() - have);
-        if (n < 0 && errno == EINTR) continue;
-        if (n < 0) return io("cannot read the file");
-        if (n == 0) break;
-        have += static_cast<size_t>(n);
-    }
-    bytes.resize(have);
-    return bytes;
-}
-
 std::string words(const char* format, auto... values) {
     char out[300];
     std::snprintf(out, sizeof out, format, values...);
@@ -88,7 +63,7 @@ Reader reader_of(std::string_view type) {
 
 Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
     const std::string type = extension(path);
-    const auto bytes = read_all(path.c_str());
+    const auto bytes = read_mesh_bytes(path.c_str());
     if (!bytes) return bytes.error();
     const bool is_gltf = type == ".gltf" || type == ".glb";
     const Reader reader = reader_of(type);
@@ -240,13 +215,41 @@ Result<void> check(const ImportOptions& options) {
 
 } // namespace
 
+Result<std::string> read_mesh_bytes(const char* path) {
+    struct Closer {
+        int fd;
+        ~Closer() {
+            if (fd >= 0) ::close(fd);
+        }
+    };
+    const Closer file{::open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK)}; // no wait at a FIFO
+    if (file.fd < 0) return io("cannot open the file");
+    struct stat status {};
+    if (::fstat(file.fd, &status) != 0) return io("cannot read the file");
+    if (S_ISDIR(status.st_mode)) return Error{ErrorCode::io, "cannot read the file", EISDIR};
+    if (!S_ISREG(status.st_mode)) return Error{ErrorCode::io, "a mesh can only be read from a regular file", ESPIPE};
+    std::string bytes(static_cast<size_t>(status.st_size), '\0');
+    constexpr size_t kMostAtOnce = size_t{1} << 24; // between two checkpoints
+    size_t have = 0;
+    while (have < bytes.size()) {
+        const ssize_t n = ::read(file.fd, bytes.data() + have, std::min(bytes.size() - have, kMostAtOnce));
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return io("cannot read the file");
+        if (n == 0) break;
+        checkpoint();
+        have += static_cast<size_t>(n);
+    }
+    bytes.resize(have);
+    return bytes;
+}
+
 ImportOptions placed_as(const Placement& placement) {
     return {.unit = 1, .scale = placement.scale, .recentre = false, .origin = placement.origin};
 }
 
 std::optional<uint64_t> hash_mesh_file(const char* path, const ImportOptions& options) try {
     const std::string type = extension(path);
-    const auto bytes = read_all(path);
+    const auto bytes = read_mesh_bytes(path);
     if (!bytes) return {};
     if (type == ".gltf" || type == ".glb") {
         // Buffers in other files are named by a "uri", which only an escape could hide. Images have one, too: then the

@@ -73,6 +73,9 @@ struct Polygons {
     }
 };
 
+/// The bytes of a regular file. Fails with io.
+Result<std::string> read_mesh_bytes(const char* path);
+
 /// The readers, each of its format's bytes. They fail with bad_file; `detail` then says the place (a line, for text).
 /// Linear in the size of what they read and make. They pass through checkpoint(), so they may throw Cancelled.
 Result<Polygons> read_obj(std::string_view bytes, std::string& detail);

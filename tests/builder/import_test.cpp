@@ -19,6 +19,7 @@
 #include <limits>
 #include <utility>
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 // Assimp 5.2 leaks its file object when a glTF's buffer is short. That one leak is not ours to find.
@@ -751,9 +752,90 @@ TEST_F(Import, GltfExtensionsThatAreNotReadAreNamed) {
     expect_refused(write("y.gltf", h.file(R"({"attributes":{"POSITION":0}})", R"([{"mesh":0}])", "")),
                    ErrorCode::bad_file, "without data");
     expect_refused(write("z.gltf", g.file(R"({"attributes":{"POSITION":7}})", R"([{"mesh":0}])", "")),
-                   ErrorCode::bad_file, "mesh 0");
+                   ErrorCode::bad_file, "meshes[0].primitives[0].attributes.POSITION");
     expect_refused(write("loop.gltf", g.file(primitive, R"([{"mesh":0,"children":[1]},{"children":[0]}])", kScene)),
                    ErrorCode::bad_file, "node");
+}
+
+// A member of a wrong type or range is never taken for absent, cut short, or for 0.
+TEST_F(Import, GltfOfWrongTypesAndRangesIsRefusedByPlace) {
+    Gltf g;
+    const size_t p = g.accessor(g.view(std::vector<float>{0, 0, 0, 1.5f, 0, 0, 0, 1.25f, 0, 0, 0, 1}, 12), 5126, 4,
+                                "VEC3", R"(,"byteOffset":0,"normalized":false)");
+    const size_t c = g.accessor(g.view(kTetrahedron), 5123, 12, "SCALAR");
+    const std::string good = g.file(R"({"attributes":{"POSITION":)" + std::to_string(p) + R"(},"mode":4,"indices":)" +
+                                        std::to_string(c) + "}",
+                                    R"([{"mesh":0,"translation":[0,0,0],"children":[1]},{}])", kScene);
+    expect_tetrahedron(write("good.gltf", good));
+    expect_tetrahedron(write("float.gltf", with(good, R"("count":4)", R"("count":4.0)")));
+    const std::pair<const char*, std::pair<const char*, const char*>> kOffences[] = {
+        {R"("bufferView":0)", {R"("bufferView":true)", "accessors[0].bufferView"}},
+        {R"("bufferView":0)", {R"("bufferView":4294967296)", "does not exist accessors[0].bufferView"}},
+        {R"("bufferView":0)", {R"("bufferView":-1)", "accessors[0].bufferView"}},
+        {R"("count":4)", {R"("count":1e39)", "accessors[0].count"}},
+        {R"("count":4)", {R"("count":-4)", "accessors[0].count"}},
+        {R"("count":4)", {R"("count":"4")", "accessors[0].count"}},
+        {R"("count":4)", {R"("count":4.5)", "accessors[0].count"}},
+        {R"("count":4)", {R"("count":9007199254740992)", "reaches beyond its buffer view accessors[0]"}},
+        {R"("count":4)", {R"("count":5)", "reaches beyond its buffer view accessors[0]"}},
+        {R"("count":4,)", {"", "missing accessors[0].count"}},
+        {R"("byteOffset":0,"normalized")", {R"("byteOffset":1e39,"normalized")", "accessors[0].byteOffset"}},
+        {R"("byteOffset":0,"normalized")", {R"("byteOffset":1,"normalized")", "reaches beyond"}},
+        {R"("normalized":false)", {R"("normalized":0)", "accessors[0].normalized"}},
+        {R"("componentType":5126)", {R"("componentType":5124)", "unknown type of numbers accessors[0]"}},
+        {R"("componentType":5123)", {R"("componentType":5126)", "accessors[1]"}},
+        {R"("type":"VEC3")", {R"("type":"VEC4")", "accessors[0].type"}},
+        {R"("byteStride":12)", {R"("byteStride":4)", "bufferViews[0].byteStride"}},
+        {R"("byteLength":48)", {R"("byteLength":47)", "reaches beyond"}},
+        {R"("byteLength":48)", {R"("byteLength":4800)", "bufferViews[0]"}},
+        {R"("buffer":0)", {R"("buffer":1)", "bufferViews[0].buffer"}},
+        {R"("buffers":[{"byteLength":72)", {R"("buffers":[{"byteLength":73)", "buffers[0]"}},
+        {R"(;base64,)", {R"(;base64,!)", "not base64 buffers[0].uri"}},
+        {R"(data:application/octet-stream;base64,)", {R"(https://example.com/)", "in the net"}},
+        {R"("mode":4)", {R"("mode":7)", "primitives[0].mode"}},
+        {R"("mode":4)", {R"("mode":null)", "primitives[0].mode"}},
+        {R"("indices":1)", {R"("indices":-1)", "primitives[0].indices"}},
+        {R"("mesh":0)", {R"("mesh":0.5)", "nodes[0].mesh"}},
+        {R"("mesh":0)", {R"("mesh":[0])", "nodes[0].mesh"}},
+        {R"([0,0,0])", {R"([0,0])", "nodes[0].translation"}},
+        {R"([0,0,0])", {R"([0,"0",0])", "nodes[0].translation[1]"}},
+        {R"("translation":[0,0,0])", {R"("matrix":[1,0,0,1,0,1,0,0,0,0,1,0,0,0,0,1])", "perspective"}},
+        {R"("children":[1])", {R"("children":[2])", "nodes[0].children[0]"}},
+        {R"("children":[1])", {R"("children":[0])", "two parents nodes[0]"}},
+        {R"("children":[1])", {R"("children":{})", "no list nodes[0].children"}},
+        {R"("scene":0)", {R"("scene":1)", "does not exist scene"}},
+        {R"("version":"2.0")", {R"("version":"1.0")", "asset.version"}},
+        {R"("version":"2.0")", {R"("version":2)", "asset.version"}},
+    };
+    for (const auto& [old, change] : kOffences)
+        expect_refused(write("bad.gltf", with(good, old, change.first)), ErrorCode::bad_file, change.second);
+
+    const auto sparse = [&](const std::string& count) {
+        Gltf h;
+        h.view(std::vector<uint8_t>{0}), h.view(std::vector<float>{0, 0, 0});
+        h.raw_accessor(R"("componentType":5126,"count":)" + count +
+                       R"(,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":0,"componentType":5121},)"
+                       R"("values":{"bufferView":1}})");
+        return write("s.gltf", h.file(R"({"attributes":{"POSITION":0}})", R"([{"mesh":0}])", ""));
+    };
+    EXPECT_EQ(load(sparse("3")).triangles.size(), 1u);
+    expect_refused(sparse("9007199254740992"), ErrorCode::bad_file, "accessors[0].count");
+    expect_refused(sparse("0"), ErrorCode::bad_file, "beyond the accessor's count");
+}
+
+TEST_F(Import, GltfBuffersInOtherFiles) {
+    Gltf g;
+    g.accessor(g.view(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0}), 5126, 3, "VEC3");
+    std::string text = g.file(R"({"attributes":{"POSITION":0}})", R"([{"mesh":0}])", "");
+    const size_t uri = text.find("data:");
+    text.replace(uri, text.find('"', uri) - uri, "its%20numbers.bin");
+    const std::string path = write("a.gltf", text);
+    expect_refused(path, ErrorCode::bad_file, "its%20numbers.bin");
+    const std::string beside = write("its numbers.bin", std::string(36, '\0'));
+    EXPECT_EQ(load(path).triangles.size(), 1u);
+    fs::remove(beside);
+    ASSERT_EQ(::mkfifo(beside.c_str(), 0600), 0);
+    expect_refused(path, ErrorCode::bad_file, "its%20numbers.bin"); // and does not wait for a writer
 }
 
 // ---- 3DS ----

@@ -56,7 +56,7 @@ set(extra_include/prolate/eigen.hpp "Eigen/.*")
 set(extra_include/prolate/glm.hpp "glm/.*")
 set(extra_include/prolate/tbb.hpp "oneapi/tbb/.*")
 set(extra_builder/import_collada.cpp "pugixml\\.hpp")
-set(extra_builder/import_gltf.cpp "tiny_gltf\\.h|nlohmann/.*")
+set(extra_builder/gltf_document.hpp "nlohmann/.*")
 set(extra_builder/import_3mf.cpp "Model/COM/.*")
 
 # allowed(OUT file layer form target): may `file` of `layer` include <target> (form "<") or "target" (form ")?
