@@ -94,22 +94,6 @@ std::string without_escapes(std::string_view uri) {
     return out;
 }
 
-// What a buffer's URI stands for: data within it, or a file.
-std::string content_of(const GltfValue& uri, const std::string& folder) {
-    const std::string& text = uri.text();
-    if (text.starts_with("data:")) {
-        constexpr std::string_view kBase64 = ";base64,";
-        const size_t at = text.find(kBase64);
-        if (at == text.npos) uri.fail("data that is not base64");
-        return from_base64(std::string_view(text).substr(at + kBase64.size()), uri);
-    }
-    if (text.find("://") != text.npos)
-        uri.fail("data elsewhere in the net, which is not fetched; put all into one file");
-    auto bytes = read_mesh_bytes((folder + without_escapes(text)).c_str());
-    if (!bytes) throw GltfFailure{"another file that cannot be read", text};
-    return std::move(*bytes);
-}
-
 // ---- numbers ----
 
 uint64_t component_size(const GltfValue& component) {
@@ -211,7 +195,9 @@ uint64_t GltfValue::whole(const char* member, uint64_t otherwise) const {
 
 // ---- the document ----
 
-GltfDocument::GltfDocument(std::string_view type, std::string_view bytes, const std::string& path) {
+GltfDocument::GltfDocument(std::string_view type, std::string_view bytes, const std::string& path,
+                           std::vector<std::string>& files)
+    : files_(files) {
     std::string_view text = bytes;
     if (type == ".glb") std::tie(text, binary_) = split_glb(bytes);
     const auto keep = [](int, Json::parse_event_t, Json&) {
@@ -221,7 +207,7 @@ GltfDocument::GltfDocument(std::string_view type, std::string_view bytes, const 
     json_ = Json::parse(text, keep, false);
     if (!json_.is_object()) throw GltfFailure{"not the JSON of a glTF file", ""};
     const size_t slash = path.rfind('/');
-    folder_ = slash == path.npos ? "./" : path.substr(0, slash + 1);
+    folder_ = slash == path.npos ? "" : path.substr(0, slash + 1);
 }
 
 GltfValue GltfDocument::named(const char* array, const GltfValue& index) const {
@@ -297,7 +283,7 @@ std::string_view GltfDocument::buffer(const GltfValue& index) {
     std::string_view out = binary_;
     if (buffer.has("uri")) {
         auto known = buffers_.find(index.whole());
-        if (known == buffers_.end()) known = buffers_.emplace(index.whole(), content_of(buffer["uri"], folder_)).first;
+        if (known == buffers_.end()) known = buffers_.emplace(index.whole(), content_of(buffer["uri"])).first;
         out = known->second;
     } else if (index.whole() != 0 || binary_.empty()) {
         buffer.fail("a buffer without data");
@@ -305,6 +291,23 @@ std::string_view GltfDocument::buffer(const GltfValue& index) {
     if (buffer["byteLength"].whole() > out.size())
         buffer.fail("a buffer shorter than it states (is the file cut short?)");
     return out;
+}
+
+// What a buffer's URI stands for: data within it, or a file.
+std::string GltfDocument::content_of(const GltfValue& uri) {
+    const std::string& text = uri.text();
+    if (text.starts_with("data:")) {
+        constexpr std::string_view kBase64 = ";base64,";
+        const size_t at = text.find(kBase64);
+        if (at == text.npos) uri.fail("data that is not base64");
+        return from_base64(std::string_view(text).substr(at + kBase64.size()), uri);
+    }
+    if (text.find("://") != text.npos)
+        uri.fail("data elsewhere in the net, which is not fetched; put all into one file");
+    files_.push_back(text.starts_with('/') ? without_escapes(text) : folder_ + without_escapes(text));
+    auto bytes = read_mesh_bytes(files_.back().c_str());
+    if (!bytes) throw GltfFailure{"another file that cannot be read", text};
+    return std::move(*bytes);
 }
 
 std::string_view gltf_json(std::string_view type, std::string_view bytes) {

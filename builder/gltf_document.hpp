@@ -47,8 +47,10 @@ private:
 
 class GltfDocument {
 public:
-    /// `type` is ".gltf" or ".glb"; `path` is where other files are sought beside. The bytes must outlive this.
-    GltfDocument(std::string_view type, std::string_view bytes, const std::string& path);
+    /// `type` is ".gltf" or ".glb"; `path` is where other files are sought beside, whose names are added to `files`.
+    /// The bytes must outlive this.
+    GltfDocument(std::string_view type, std::string_view bytes, const std::string& path,
+                 std::vector<std::string>& files);
 
     GltfValue root() const { return {json_, ""}; }
     /// What `index` names of the root's array.
@@ -67,10 +69,12 @@ private:
     std::vector<double> read_view(const GltfValue& view_index, const Layout& layout, const GltfValue& owner);
     void fill_in(const GltfValue& sparse, const Layout& layout, std::vector<double>& rows);
     std::string_view buffer(const GltfValue& index);
+    std::string content_of(const GltfValue& uri);
 
     nlohmann::json json_;
     std::string_view binary_; // of a GLB
     std::string folder_;
+    std::vector<std::string>& files_;
     std::map<uint64_t, std::string> buffers_; // those from elsewhere, as far as they were asked for
 };
 

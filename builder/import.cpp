@@ -1,6 +1,7 @@
 // load_mesh(): from a file to a mesh. Each format has its reader (polygons.hpp), which gives polygons in double
 // precision; here they are placed, rounded to float, and cut into triangles.
 #include "builder/job.hpp"
+#include "builder/mesh.hpp"
 #include "builder/polygons.hpp"
 #include "builder/triangulate.hpp"
 
@@ -61,7 +62,7 @@ Reader reader_of(std::string_view type) {
     return nullptr;
 }
 
-Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
+Result<Polygons> read_polygons(const std::string& path, ImportReport& report) {
     const std::string type = extension(path);
     const auto bytes = read_mesh_bytes(path.c_str());
     if (!bytes) return bytes.error();
@@ -75,7 +76,7 @@ Result<Polygons> read_polygons(const std::string& path, std::string& detail) {
     if (content.starts_with("version https://git-lfs"))
         return Error{ErrorCode::bad_file, "a pointer of Git LFS, not the file itself; fetch it with 'git lfs pull'"};
     if (content.starts_with("\xEF\xBB\xBF")) content.remove_prefix(3); // the mark of UTF-8
-    return is_gltf ? read_gltf(type, content, path, detail) : reader(content, detail);
+    return is_gltf ? read_gltf(type, content, path, report) : reader(content, report.detail);
 }
 
 struct Extent {
@@ -152,7 +153,9 @@ Result<Mesh> to_mesh(const Polygons& polygons, const Placement& placement, Impor
     double most_bent = 0;
     std::vector<uint32_t> face;
     size_t first = 0;
+    Checkpoints checkpoint;
     for (size_t f = 0; f < polygons.sizes.size(); first += polygons.sizes[f++]) {
+        checkpoint();
         const auto begin = polygons.corners.begin() + static_cast<ptrdiff_t>(first);
         face.assign(begin, begin + polygons.sizes[f]);
         if (mirrors) std::reverse(face.begin() + 1, face.end());
@@ -191,7 +194,7 @@ Result<void> check_finite(const Polygons& polygons, const ImportOptions& options
 }
 
 Result<Mesh> load_or_throw(const char* path, const ImportOptions& options, ImportReport& report) {
-    auto polygons = read_polygons(path, report.detail);
+    auto polygons = read_polygons(path, report);
     if (!polygons) return polygons.error();
     report.notes = std::move(polygons->notes);
     if (polygons->sizes.empty()) return Error{ErrorCode::bad_file, "the file has no triangles"};
@@ -200,7 +203,10 @@ Result<Mesh> load_or_throw(const char* path, const ImportOptions& options, Impor
     if (!placement) return placement.error();
     if (polygons->unit_is_ignored && placement->scale == Placement{}.scale)
         report.notes.push_back("its unit is not applied: --unit or --scale makes its numbers metres");
-    return to_mesh(*polygons, *placement, report);
+    auto mesh = to_mesh(*polygons, *placement, report);
+    if (mesh)
+        if (const auto sound = check_mesh(mesh->view()); !sound) return sound.error();
+    return mesh;
 }
 
 Result<void> check(const ImportOptions& options) {
@@ -268,13 +274,16 @@ std::optional<uint64_t> hash_mesh_file(const char* path, const ImportOptions& op
     return {};
 }
 
-Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportReport* report) {
+Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportReport* report,
+                       const std::function<bool()>& go_on) {
     ImportReport unused;
     ImportReport& out = report ? *report : unused;
     if (const auto valid = check(options); !valid) return valid.error();
     try {
         out = {};
-        return load_or_throw(path, options, out);
+        return Job(1, go_on).run([&] { return load_or_throw(path, options, out); });
+    } catch (const Cancelled&) {
+        return Error{ErrorCode::cancelled, "cancelled"};
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, "the mesh does not fit into memory"};
     } catch (const std::exception& e) {

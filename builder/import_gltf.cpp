@@ -255,11 +255,11 @@ private:
 } // namespace
 
 Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path,
-                           std::string& detail) try {
-    GltfDocument document(type, bytes, path);
+                           ImportReport& report) try {
+    GltfDocument document(type, bytes, path, report.files);
     return SceneReader(document).read();
 } catch (const GltfFailure& failure) {
-    detail = failure.place;
+    report.detail = failure.place;
     return Error{ErrorCode::bad_file, failure.what};
 }
 

@@ -12,8 +12,9 @@
 //
 // By sorting, so O(n log n) for every input, and the same result everywhere: vertices and triangles keep their order.
 // Known limit: duplicated triangles stay.
-#include <prolate/mesh.hpp>
+#include "builder/mesh.hpp"
 
+#include "builder/job.hpp"
 #include "builder/shells.hpp"
 
 #include "src/hash.hpp"
@@ -32,6 +33,7 @@ namespace prolate {
 namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr const char* kNoArea = "the mesh has no triangle with an area";
 constexpr double kSmallest = 1e-24; // diagonal: a leaf of kThinnestNodeOfMesh needs an exponent that the format has
 constexpr float kWeldSpacings = 8;  // of kDefaultWeld
 
@@ -54,7 +56,8 @@ std::vector<uint32_t> representatives(std::span<const Vec3> vertices) {
     std::vector<Key> keys(vertices.size());
     for (uint32_t i = 0; i < keys.size(); ++i)
         keys[i] = {{bits(vertices[i].x), bits(vertices[i].y), bits(vertices[i].z)}, i};
-    std::sort(keys.begin(), keys.end());
+    Checkpoints checkpoint;
+    std::sort(keys.begin(), keys.end(), [&checkpoint](const Key& a, const Key& b) { return checkpoint(), a < b; });
     std::vector<uint32_t> first(vertices.size());
     for (size_t i = 0; i < keys.size(); ++i) {
         const bool same = i > 0 && keys[i].position == keys[i - 1].position;
@@ -95,7 +98,9 @@ std::vector<Side> sorted_sides(std::span<const Triangle> triangles) {
             sides.push_back({std::min(from, to), std::max(from, to), from < to ? 1 : -1});
         }
     }
-    std::sort(sides.begin(), sides.end(), before);
+    Checkpoints checkpoint;
+    std::sort(sides.begin(), sides.end(),
+              [&checkpoint](const Side& a, const Side& b) { return checkpoint(), before(a, b); });
     return sides;
 }
 
@@ -141,6 +146,7 @@ std::vector<uint32_t> joined_vertices(std::span<const Vec3> vertices, std::span<
     };
     for (uint32_t v = 0; v < vertices.size(); ++v) {
         if (!at_open_edge[v]) continue;
+        checkpoint();
         const Cell own = {cell_of(vertices[v].x), cell_of(vertices[v].y), cell_of(vertices[v].z)};
         double nearest = tolerance;
         for (int64_t n = 0; n < 27; ++n) {
@@ -210,37 +216,32 @@ void drop_unused(Mesh& mesh, MeshReport& report, std::span<const uint32_t> repre
         for (uint32_t& corner : t) corner = number[corner];
 }
 
-// The size of the mesh's box, if a tree can hold it.
-Result<void> measure(const Mesh& mesh, MeshReport& report) {
-    const auto extent = [&mesh](float Vec3::*axis) {
-        const auto less = [axis](const Vec3& a, const Vec3& b) { return a.*axis < b.*axis; };
-        const auto [low, high] = std::minmax_element(mesh.vertices.begin(), mesh.vertices.end(), less);
-        return double{(*high).*axis} - (*low).*axis;
-    };
-    report.size = {extent(&Vec3::x), extent(&Vec3::y), extent(&Vec3::z)};
-    const double diagonal = std::hypot(report.size[0], report.size[1], report.size[2]);
-    if (diagonal < kSmallest)
-        return Error{ErrorCode::bad_mesh, "the mesh is less than 1e-24 m across; give it in another unit"};
-    return {};
+// Of the box of all that triangles use.
+std::array<double, 3> box_size(MeshView mesh) {
+    Vec3 low = mesh.vertices[mesh.triangles[0][0]], high = low;
+    for (const Triangle& t : mesh.triangles)
+        for (const uint32_t corner : t) {
+            const Vec3& v = mesh.vertices[corner];
+            low = {std::min(low.x, v.x), std::min(low.y, v.y), std::min(low.z, v.z)};
+            high = {std::max(high.x, v.x), std::max(high.y, v.y), std::max(high.z, v.z)};
+        }
+    return {double{high.x} - low.x, double{high.y} - low.y, double{high.z} - low.z};
+}
+
+// The triangles with the corners that they were merged and joined to; but for those that are redundant.
+void keep_triangles(std::span<const Triangle> welded, MeshView input, std::span<const Side> sides, CleanMesh& out) {
+    std::vector<bool> is_corner(input.vertices.size());
+    for (const Side& side : sides) is_corner[side.low] = is_corner[side.high] = true;
+    for (const Triangle& t : welded) {
+        const bool repeated = has_repeated_corner(t);
+        out.report.degenerate_triangles += repeated || is_collinear(input.vertices, t);
+        if (!repeated || !is_redundant(t, sides, is_corner)) out.mesh.triangles.push_back(t);
+    }
 }
 
 Result<CleanMesh> clean_or_throw(MeshView input, float weld) {
     if (std::isnan(weld)) return Error{ErrorCode::bad_options, "the weld tolerance must be a length"};
-    constexpr size_t kMost = kNone - 1;
-    if (input.triangles.empty()) return Error{ErrorCode::bad_mesh, "the mesh has no triangles"};
-    if (input.vertices.size() > kMost || input.triangles.size() > kMost)
-        return Error{ErrorCode::bad_mesh, "the mesh has too many vertices or triangles (2^32 or more)"};
-    for (size_t i = 0; i < input.vertices.size(); ++i) {
-        if (!is_finite(input.vertices[i])) return Error{ErrorCode::bad_mesh, "vertex coordinate is not finite", i};
-        if (!within_limit(input.vertices[i]))
-            return Error{ErrorCode::bad_mesh, "vertex coordinate beyond 1.9e22 m (2^74); give the mesh in another unit",
-                         i};
-    }
-    for (size_t i = 0; i < input.triangles.size(); ++i)
-        for (const uint32_t corner : input.triangles[i])
-            if (corner >= input.vertices.size())
-                return Error{ErrorCode::bad_mesh, "triangle names a vertex that does not exist", i};
-
+    if (const auto sound = check_mesh(input); !sound) return sound.error();
     CleanMesh out;
     MeshReport& report = out.report;
     report.input_vertices = static_cast<uint32_t>(input.vertices.size());
@@ -251,39 +252,59 @@ Result<CleanMesh> clean_or_throw(MeshView input, float weld) {
     std::vector<Triangle> welded(input.triangles.begin(), input.triangles.end());
     for (Triangle& t : welded)
         for (uint32_t& corner : t) corner = representative[corner];
-
     std::vector<Side> sides = sorted_sides(welded);
     classify_edges(sides, report);
     if (!report.closed && weld != 0) {
         const double tolerance = weld > 0 ? double{weld} : default_weld(input.vertices, welded);
         close_by_welding(input.vertices, tolerance, welded, sides, representative, report);
     }
-    std::vector<bool> is_corner(input.vertices.size());
-    for (const Side& side : sides) is_corner[side.low] = is_corner[side.high] = true;
-
-    for (const Triangle& t : welded) {
-        const bool repeated = has_repeated_corner(t);
-        report.degenerate_triangles += repeated || is_collinear(input.vertices, t);
-        if (!repeated || !is_redundant(t, sides, is_corner)) out.mesh.triangles.push_back(t);
-    }
-    if (report.degenerate_triangles == report.input_triangles)
-        return Error{ErrorCode::bad_mesh, "the mesh has no triangle with an area"};
+    keep_triangles(welded, input, sides, out);
+    if (report.degenerate_triangles == report.input_triangles) return Error{ErrorCode::bad_mesh, kNoArea};
 
     out.mesh.vertices.assign(input.vertices.begin(), input.vertices.end());
     // -0 and +0 were merged; which of them came first must not show in the result.
     for (Vec3& v : out.mesh.vertices) v = {v.x + 0.0f, v.y + 0.0f, v.z + 0.0f};
     drop_unused(out.mesh, report, representative);
     out.mesh.placement = input.placement;
-    if (const auto fits = measure(out.mesh, report); !fits) return fits.error();
-    report.turned_shells = turn_shells(out.mesh);
+    report.size = box_size(out.mesh.view());
+    const TurnedShells shells = turn_shells(out.mesh);
+    report.turned_shells = shells.turned;
+    if (report.closed && !shells.has_volume && encloses_nothing(out.mesh)) report.closed = false;
     return out;
 }
 
 } // namespace
 
-Result<CleanMesh> clean(MeshView mesh, float weld) {
+Result<void> check_mesh(MeshView mesh) {
+    constexpr size_t kMost = kNone - 1;
+    if (mesh.triangles.empty()) return Error{ErrorCode::bad_mesh, "the mesh has no triangles"};
+    if (mesh.vertices.size() > kMost || mesh.triangles.size() > kMost)
+        return Error{ErrorCode::bad_mesh, "the mesh has too many vertices or triangles (2^32 or more)"};
+    for (size_t i = 0; i < mesh.vertices.size(); ++i) {
+        if (!is_finite(mesh.vertices[i])) return Error{ErrorCode::bad_mesh, "vertex coordinate is not finite", i};
+        if (!within_limit(mesh.vertices[i]))
+            return Error{ErrorCode::bad_mesh, "vertex coordinate beyond 1.9e22 m (2^74); give the mesh in another unit",
+                         i};
+    }
+    for (size_t i = 0; i < mesh.triangles.size(); ++i)
+        for (const uint32_t corner : mesh.triangles[i])
+            if (corner >= mesh.vertices.size())
+                return Error{ErrorCode::bad_mesh, "triangle names a vertex that does not exist", i};
+    const auto has_area = [&mesh](const Triangle& t) { return !is_collinear(mesh.vertices, t); };
+    if (std::none_of(mesh.triangles.begin(), mesh.triangles.end(), has_area))
+        return Error{ErrorCode::bad_mesh, kNoArea};
+    const auto size = box_size(mesh);
+    if (std::hypot(size[0], size[1], size[2]) < kSmallest)
+        return Error{ErrorCode::bad_mesh, "the mesh is less than 1e-24 m across; give it in another unit"};
+    return {};
+}
+
+Result<CleanMesh> clean(MeshView mesh, float weld, const std::function<bool()>& go_on) {
     try {
-        return clean_or_throw(mesh, weld);
+        if (!go_on) return clean_or_throw(mesh, weld); // for the job that this thread works for, if any
+        return Job(0, go_on).run([&] { return clean_or_throw(mesh, weld); });
+    } catch (const Cancelled&) {
+        return Error{ErrorCode::cancelled, "cancelled"};
     } catch (const std::bad_alloc&) {
     } catch (const std::length_error&) {
     }

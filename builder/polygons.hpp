@@ -3,6 +3,7 @@
 #pragma once
 
 #include <prolate/error.hpp>
+#include <prolate/mesh.hpp>
 
 #include <array>
 #include <cstddef>
@@ -86,7 +87,8 @@ Result<Polygons> read_3ds(std::string_view bytes, std::string& detail);
 Result<Polygons> read_collada(std::string_view bytes, std::string& detail);
 Result<Polygons> read_3mf(std::string_view bytes, std::string& detail);
 /// `type` is the name's extension in lower case, with the dot; other files are sought beside `path`.
-Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path, std::string& detail);
+Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path,
+                           ImportReport& report);
 /// The JSON of a glTF or GLB file; empty if there is none.
 std::string_view gltf_json(std::string_view type, std::string_view bytes);
 

@@ -10,12 +10,15 @@
 // never takes anything from the solid.
 #include "builder/shells.hpp"
 
+#include "builder/job.hpp"
 #include "builder/winding.hpp"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <utility>
@@ -26,6 +29,7 @@ namespace {
 constexpr size_t kSamples = 32;            // triangles of a shell that are asked
 constexpr double kClearlyNegative = -0.25; // of -1/2, and its error
 constexpr double kNoVolume = 1e-9;         // of the area's 3/2 power: flat, or as much in as out
+constexpr double kOffSurface = 1e-3; // of the root of a triangle's area: a step to where the winding number is clear
 
 struct Side {
     uint32_t low, high, triangle;
@@ -76,50 +80,89 @@ Shells find_shells(std::span<const Triangle> triangles) {
     return out;
 }
 
+// How much a shell encloses.
+struct Extent {
+    double volume = 0, area = 0;
+
+    bool has_volume() const { return std::abs(volume) > kNoVolume * std::pow(area, 1.5); }
+};
+
+std::array<Vec, 3> corners_of(const Mesh& mesh, uint32_t t) {
+    const auto corner = [&](size_t i) { return to_vec(mesh.vertices[mesh.triangles[t][i]]); };
+    return {corner(0), corner(1), corner(2)};
+}
+
+// Volumes are taken around a point of each shell, so that they keep their digits far from (0, 0, 0).
+std::vector<Extent> extents(const Mesh& mesh, const Shells& shells) {
+    constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+    std::vector<uint32_t> first(shells.closed.size(), kNone);
+    std::vector<Extent> out(shells.closed.size());
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+        const uint32_t shell = shells.of[t];
+        if (first[shell] == kNone) first[shell] = t;
+        const auto [p, q, r] = corners_of(mesh, t);
+        const Vec o = corners_of(mesh, first[shell])[0], a = p - o, b = q - o, c = r - o;
+        out[shell].volume += a.dot(b.cross(c)) / 6;
+        out[shell].area += (b - a).cross(c - a).norm() / 2;
+    }
+    return out;
+}
+
 } // namespace
 
-uint32_t turn_shells(Mesh& mesh) {
+TurnedShells turn_shells(Mesh& mesh) {
     const Shells shells = find_shells(mesh.triangles);
-    const size_t count = shells.closed.size();
-    // Volumes around a point of each, so that they keep their digits far from (0, 0, 0).
-    std::vector<double> volume(count), area(count);
-    std::vector<std::vector<uint32_t>> members(count);
-    const auto corner = [&](uint32_t t, size_t i) { return to_vec(mesh.vertices[mesh.triangles[t][i]]); };
-    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-        std::vector<uint32_t>& shell = members[shells.of[t]];
-        shell.push_back(t);
-        const Vec o = corner(shell.front(), 0), a = corner(t, 0) - o, b = corner(t, 1) - o, c = corner(t, 2) - o;
-        volume[shells.of[t]] += a.dot(b.cross(c)) / 6;
-        area[shells.of[t]] += (b - a).cross(c - a).norm() / 2;
+    const std::vector<Extent> extent = extents(mesh, shells);
+    const size_t count = extent.size();
+    TurnedShells out;
+    bool any_inward = false;
+    for (size_t s = 0; s < count; ++s) {
+        out.has_volume |= extent[s].has_volume();
+        any_inward |= shells.closed[s] && extent[s].volume < 0 && extent[s].has_volume();
     }
-    const auto has_volume = [&](size_t s) { return std::abs(volume[s]) > kNoVolume * std::pow(area[s], 1.5); };
-    const auto is_inward = [&](size_t s) { return shells.closed[s] && volume[s] < 0 && has_volume(s); };
-    bool any = false;
-    for (size_t s = 0; s < count; ++s) any |= is_inward(s);
-    if (!any) return 0; // then nothing is negative around any other shell either
+    if (!any_inward) return out; // then nothing is negative around any other shell either
 
+    std::vector<std::vector<uint32_t>> members(count);
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) members[shells.of[t]].push_back(t);
     const Winding winding(mesh.view());
     const auto is_negative = [&](uint32_t t) {
-        const Vec a = corner(t, 0), b = corner(t, 1), c = corner(t, 2), p = (a + b + c) / 3;
+        const auto [a, b, c] = corners_of(mesh, t);
+        const Vec p = (a + b + c) / 3;
         // Seen from itself a triangle counts for nothing; rounding makes it one side or the other.
         const double itself = solid_angle(a, b, c, p) / (4 * std::numbers::pi);
         return winding(p) - itself < kClearlyNegative;
     };
     std::vector<bool> turned(count);
     for (size_t s = 0; s < count; ++s) {
-        if (!shells.closed[s] || !has_volume(s)) continue;
+        if (!shells.closed[s] || !extent[s].has_volume()) continue;
         const size_t step = std::max<size_t>(1, members[s].size() / kSamples);
         size_t asked = 0, negative = 0;
         for (size_t i = 0; i < members[s].size(); i += step) {
-            const uint32_t t = members[s][i];
-            if ((corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).norm() == 0) continue;
-            ++asked, negative += is_negative(t);
+            checkpoint();
+            const auto [a, b, c] = corners_of(mesh, members[s][i]);
+            if ((b - a).cross(c - a).norm() == 0) continue;
+            ++asked, negative += is_negative(members[s][i]);
         }
-        turned[s] = volume[s] < 0 ? negative > 0 : negative == asked && asked > 0;
+        turned[s] = extent[s].volume < 0 ? negative > 0 : negative == asked && asked > 0;
     }
     for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
         if (turned[shells.of[t]]) std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
-    return static_cast<uint32_t>(std::count(turned.begin(), turned.end(), true));
+    out.turned = static_cast<uint32_t>(std::count(turned.begin(), turned.end(), true));
+    return out;
+}
+
+bool encloses_nothing(const Mesh& mesh) {
+    const Winding winding(mesh.view());
+    for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+        checkpoint();
+        const auto [a, b, c] = corners_of(mesh, t);
+        const Vec across = (b - a).cross(c - a);
+        if (across.norm() == 0) continue;
+        const Vec step = kOffSurface * std::sqrt(across.norm()) * across.normalized(), p = (a + b + c) / 3;
+        for (const Vec& beside : {Vec(p + step), Vec(p - step)})
+            if (winding.whole(beside).value_or(0) != 0) return false;
+    }
+    return true;
 }
 
 } // namespace prolate

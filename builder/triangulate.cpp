@@ -15,6 +15,8 @@
 // end the triangles' areas may exceed the polygon's by what rounding can explain, and not by more.
 #include "builder/triangulate.hpp"
 
+#include "builder/job.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -163,7 +165,8 @@ private:
         return part > 0 ? std::min(static_cast<uint32_t>(std::min(part, double{kMostCells})), cells_ - 1) : 0;
     }
 
-    bool is_ear(uint32_t q) const {
+    bool is_ear(uint32_t q) {
+        checkpoint_();
         const uint32_t p = previous_[q], r = next_[q];
         const Flat &a = at_[p], &b = at_[q], &c = at_[r];
         if (turn(a, b, c) <= 0) return false;
@@ -232,6 +235,7 @@ private:
     Flat low_{}, high_{};
     uint32_t cells_ = 1;
     std::vector<std::vector<uint32_t>> in_cell_; // obstacles, by place
+    Checkpoints checkpoint_;
 };
 
 } // namespace

@@ -50,7 +50,7 @@ Result<Mesh> load_standard_input(const ImportOptions& options, ImportReport& rep
         return Error{ErrorCode::io, "cannot be kept in the folder for temporary files", static_cast<uint64_t>(errno)};
     ::close(file);
     const auto written = save(name.c_str(), std::as_bytes(std::span(*bytes)));
-    auto mesh = written ? load_mesh(name.c_str(), options, &report) : Result<Mesh>(written.error());
+    auto mesh = written ? load_mesh(name.c_str(), options, &report, not_interrupted) : Result<Mesh>(written.error());
     ::unlink(name.c_str());
     return mesh;
 }
@@ -95,7 +95,8 @@ Outcome<Mesh> read_mesh(const std::string& path, const ImportOptions& options) {
     if (piped)
         if (const auto taken = take_standard_input(); !taken) return taken.error();
     ImportReport report;
-    auto mesh = piped ? load_standard_input(options, report) : load_mesh(path.c_str(), options, &report);
+    auto mesh =
+        piped ? load_standard_input(options, report) : load_mesh(path.c_str(), options, &report, not_interrupted);
     if (!mesh)
         return failure_of(piped ? "standard input" : path, mesh.error(), report.detail,
                           mesh.error().code == ErrorCode::bad_file

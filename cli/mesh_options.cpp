@@ -85,7 +85,9 @@ void describe_mesh(const std::string& path, const MeshReport& report) {
         note(path, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
     if (report.non_manifold_edges > 0)
         note(path, fmt::format("{} edges belong to three or more triangles", grouped(report.non_manifold_edges)));
-    if (!report.closed)
+    if (!report.closed && report.open_edges == 0)
+        note(path, "its triangles are all there twice, facing both ways, so it encloses nothing: surface mode");
+    if (report.open_edges > 0)
         note(path, fmt::format("{} open edges: no inside can be promised, surface mode", grouped(report.open_edges)));
 }
 

@@ -13,6 +13,10 @@ void interruption_as_json(int file) noexcept;
 
 /// Has such a signal come while a GracefulStop lived? Its number, or 0.
 int interrupted() noexcept;
+/// For work that asks whether to go on.
+inline bool not_interrupted() noexcept {
+    return interrupted() == 0;
+}
 
 /// While one lives, the first signal only sets interrupted(), and the work in progress must look at it, or be short.
 class GracefulStop {

@@ -4,6 +4,7 @@
 #include "cli/inputs.hpp"
 #include "cli/levels.hpp"
 #include "cli/progress_line.hpp"
+#include "cli/signals.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -56,7 +57,7 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     if (!mesh) return mesh.error();
     // The mesh itself says it, if there is anything to compare it with.
     if ((old && old->view().bake_info().options_hash == key) || cache) {
-        const auto cleaned = clean(mesh->view(), options->weld);
+        const auto cleaned = clean(mesh->view(), options->weld, not_interrupted);
         if (!cleaned) return failure_of(a.mesh, cleaned.error());
         const uint64_t source = hash(cleaned->mesh.view());
         // Remembered only if the file was the same before and after it was read.

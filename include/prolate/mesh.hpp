@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -43,7 +44,9 @@ struct MeshReport {
     uint32_t degenerate_triangles = 0;
     uint32_t open_edges = 0;         ///< edges whose triangles do not cancel (boundary, or inconsistently oriented)
     uint32_t non_manifold_edges = 0; ///< edges of three or more triangles
-    bool closed = false;             ///< no open edge: winding numbers are whole, and the mesh bounds a solid
+    /// No open edge, so that winding numbers are whole, and something enclosed: the mesh bounds a solid. A surface
+    /// whose every triangle also stands there facing the other way has no open edge and encloses nothing.
+    bool closed = false;
     uint32_t turned_shells = 0;      ///< closed parts that were inside out; their triangles were turned
     std::array<double, 3> size = {}; ///< of the mesh's box, metres
 };
@@ -70,8 +73,9 @@ inline constexpr float kDefaultWeld = -1;
 ///
 /// Fails with bad_mesh for no triangle with an area, an index out of range, a coordinate that is not finite or beyond
 /// kLargestCoordinate (`what` begins with "triangle" or "vertex", and `where` is its index), or a mesh of less than
-/// 1e-24 m across; with out_of_memory. O(n log n). Thread-safe.
-Result<CleanMesh> clean(MeshView mesh, float weld = kDefaultWeld);
+/// 1e-24 m across; with out_of_memory; with cancelled, within a second, once `go_on` has said false: it is asked some
+/// times a second, from one thread at a time. O(n log n). Thread-safe.
+Result<CleanMesh> clean(MeshView mesh, float weld = kDefaultWeld, const std::function<bool()>& go_on = {});
 
 /// XXH3-64 of vertices, triangles and placement. Of a cleaned mesh, it is what BakeInfo::source_hash holds.
 uint64_t hash(MeshView mesh) noexcept;
@@ -94,6 +98,7 @@ ImportOptions placed_as(const Placement& placement);
 struct ImportReport {
     std::string detail;             ///< of an error: the place in the file, a reader's own words
     std::vector<std::string> notes; ///< what the file states and what was done about it, a line each
+    std::vector<std::string> files; ///< other files that were read, or should have been: a glTF's buffers
 };
 
 /// Reads every mesh of a scene, with its transforms: OBJ, PLY, STL, OFF, glTF/GLB, 3MF, 3DS, DAE (by the name's
@@ -105,10 +110,14 @@ struct ImportReport {
 /// names it. Points and lines are left out. Axes stay as the file has them. A DAE's unit is noted and not applied; a
 /// 3MF's is. Of glTF, quantised positions and GPU instances are read; compressed geometry is refused by name.
 ///
-/// Fails with io (`where` is errno), out_of_memory, bad_file, or bad_mesh: that is a mesh so far from (0, 0, 0) that
-/// floats there are farther apart than 1e-5 of its diagonal (without `recentre`). What follows a "; " in Error::what is
-/// advice. The mesh is not cleaned yet. Thread-safe.
-Result<Mesh> load_mesh(const char* path, const ImportOptions& options = {}, ImportReport* report = nullptr);
+/// Fails with io (`where` is errno), out_of_memory, bad_file, or bad_mesh: for what clean() fails for, and a mesh so
+/// far from (0, 0, 0) that floats there are farther apart than 1e-5 of its diagonal (without `recentre`). What follows
+/// a
+/// "; " in Error::what is advice. Fails with cancelled, once `go_on` has said false: it is asked some times a second,
+/// but not while a library parses the text of a glTF or DAE (some 100 MB a second) or unpacks a 3MF. The mesh is not
+/// cleaned yet. Thread-safe.
+Result<Mesh> load_mesh(const char* path, const ImportOptions& options = {}, ImportReport* report = nullptr,
+                       const std::function<bool()>& go_on = {});
 
 /// A hash of all that load_mesh() makes the mesh of `path` from: the bytes of the file, its type, the options, the
 /// reader's version. Equal hashes mean equal meshes, at the cost of reading the file. Empty if the file cannot be read,

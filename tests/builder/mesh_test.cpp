@@ -429,6 +429,43 @@ TEST(Clean, AnOpenPartIsNotTurnedAndAClosedOneBesideItIs) {
     EXPECT_FALSE(cleaned->report.closed);
 }
 
+// Both sides of a surface are no solid, however each is cut into triangles; two lobes of opposite signs are one.
+TEST(Clean, WhatEnclosesNothingIsNotClosed) {
+    const Mesh solid = tetrahedron();
+    Mesh both = solid;
+    for (const Triangle& t : solid.triangles) both.triangles.push_back({t[0], t[2], t[1]});
+    const Mesh sheet = {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}, {1, 0, 3}, {1, 3, 2}}};
+    for (const Mesh& mesh : {both, soup(both), sheet, soup(sheet)}) {
+        const auto cleaned = clean(mesh.view());
+        ASSERT_TRUE(cleaned);
+        EXPECT_EQ(cleaned->report.open_edges, 0u);
+        EXPECT_FALSE(cleaned->report.closed);
+        EXPECT_EQ(cleaned->mesh.triangles.size(), mesh.triangles.size()) << "no point of the surface is lost";
+    }
+    Mesh lobes = solid; // its mirror image, facing inwards, on the same edge
+    lobes.vertices.insert(lobes.vertices.end(), {{0, -1, 0}, {0, 0, -1}});
+    for (const Triangle& t : solid.triangles) {
+        Triangle image = t;
+        for (uint32_t& corner : image) corner += corner < 2 ? 0 : 2;
+        lobes.triangles.push_back({image[0], image[2], image[1]});
+    }
+    Mesh solid_and_sheet = solid;
+    solid_and_sheet.vertices.insert(solid_and_sheet.vertices.end(), {{5, 0, 0}, {6, 0, 0}, {5, 1, 0}});
+    solid_and_sheet.triangles.insert(solid_and_sheet.triangles.end(), {{4, 5, 6}, {4, 6, 5}});
+    for (const Mesh& mesh : {lobes, solid_and_sheet}) {
+        const auto cleaned = clean(mesh.view());
+        ASSERT_TRUE(cleaned);
+        EXPECT_TRUE(cleaned->report.closed);
+    }
+}
+
+TEST(Clean, CanBeStopped) {
+    const Mesh mesh = soup(torus(1000, 300));
+    const auto cleaned = clean(mesh.view(), kDefaultWeld, [] { return false; });
+    ASSERT_FALSE(cleaned);
+    EXPECT_EQ(cleaned.error().code, ErrorCode::cancelled);
+}
+
 TEST(Clean, RefusesSizesThatNoTreeCanHold) {
     for (const float size : {1e-37f, 1e25f}) {
         Mesh mesh = tetrahedron();
