@@ -160,14 +160,14 @@ std::vector<uint32_t> joined_vertices(std::span<const Vec3> vertices, std::span<
     return to;
 }
 
-double default_weld(std::span<const Vec3> vertices, std::span<const Triangle> triangles) {
+double default_weld_of(std::span<const Vec3> vertices, std::span<const Triangle> triangles) {
     float largest = 0;
     for (const Triangle& t : triangles)
         for (const uint32_t corner : t) {
             const Vec3& v = vertices[corner];
             largest = std::max({largest, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
         }
-    return double{kWeldSpacings} * (double{std::nextafter(largest, HUGE_VALF)} - double{largest});
+    return default_weld(largest);
 }
 
 // Joins what closes the mesh, if anything does: changes triangles, sides and report.
@@ -255,7 +255,7 @@ Result<CleanMesh> clean_or_throw(MeshView input, float weld) {
     std::vector<Side> sides = sorted_sides(welded);
     classify_edges(sides, report);
     if (!report.closed && weld != 0) {
-        const double tolerance = weld > 0 ? double{weld} : default_weld(input.vertices, welded);
+        const double tolerance = weld > 0 ? double{weld} : default_weld_of(input.vertices, welded);
         close_by_welding(input.vertices, tolerance, welded, sides, representative, report);
     }
     keep_triangles(welded, input, sides, out);
@@ -274,6 +274,10 @@ Result<CleanMesh> clean_or_throw(MeshView input, float weld) {
 }
 
 } // namespace
+
+double default_weld(float largest_coordinate) noexcept {
+    return double{kWeldSpacings} * (double{std::nextafter(largest_coordinate, HUGE_VALF)} - double{largest_coordinate});
+}
 
 Result<void> check_mesh(MeshView mesh) {
     constexpr size_t kMost = kNone - 1;

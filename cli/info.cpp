@@ -6,12 +6,15 @@
 #include "cli/levels.hpp"
 #include "cli/words.hpp"
 
+#include <prolate/mesh.hpp>
 #include <prolate/version.hpp>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 
 namespace prolate::cli {
@@ -47,6 +50,17 @@ std::string as_json(const TreeView& tree) {
     return text_of(out);
 }
 
+// How far apart vertices may have been that clean() joined.
+double weld_tolerance(const TreeView& tree) {
+    if (const float asked = tree.bake_info().weld; asked >= 0) return double{asked};
+    float largest = 0;
+    for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
+        const Vec3 p = tree.vertex(v);
+        largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+    }
+    return default_weld(largest);
+}
+
 std::string as_text(const std::string& name, const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
     std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", visible(name), kFormatVersion,
@@ -59,6 +73,8 @@ std::string as_text(const std::string& name, const TreeView& tree) {
         out += fmt::format("  exact     {} triangles on {} vertices, {} connected component{}\n",
                            grouped(tree.triangle_count()), grouped(tree.vertex_count()),
                            grouped(tree.component_count()), tree.component_count() == 1 ? "" : "s");
+    if (const double weld = weld_tolerance(tree); info.exact && weld > 0)
+        out += fmt::format("  welded    corners up to {:.2g} m apart may be one, where that closed the mesh\n", weld);
     if (info.surface_mode)
         out +=
             fmt::format("  covers    the triangles of an open mesh (surface mode), diagonal {:.6g}\n", info.diagonal);

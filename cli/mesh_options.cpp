@@ -67,17 +67,17 @@ std::string size_text(const MeshReport& report) {
     return fmt::format("{:.6g} x {:.6g} x {:.6g} m", report.size[0], report.size[1], report.size[2]);
 }
 
-void describe_mesh(const std::string& path, const MeshReport& report) {
+void describe_mesh(const std::string& path, const MeshReport& report, bool for_exact_tree) {
     // Some readers give each triangle corners of its own, so the number merged says little of the file.
     const uint32_t distinct =
         report.input_vertices - report.merged_vertices - report.welded_vertices - report.unused_vertices;
     note(path, fmt::format("{} triangles on {} distinct vertices ({} as read), box {}", grouped(report.input_triangles),
                            grouped(distinct), grouped(report.input_vertices), size_text(report)));
     if (report.welded_vertices > 0)
-        note(path,
-             fmt::format("{} vertices joined with others up to {:.2g} m away, which closes the mesh; its surface is "
-                         "covered as it stood before, too",
-                         grouped(report.welded_vertices), report.weld_distance));
+        note(path, fmt::format("{} vertices joined with others up to {:.2g} m away, which closes the mesh; {}",
+                               grouped(report.welded_vertices), report.weld_distance,
+                               for_exact_tree ? "answers are for the mesh so joined"
+                                              : "its surface is covered as it stood before, too"));
     if (report.turned_shells > 0)
         note(path, fmt::format("{} closed part{} inside out: turned", grouped(report.turned_shells),
                                report.turned_shells == 1 ? " was" : "s were"));

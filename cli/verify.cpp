@@ -94,7 +94,7 @@ Outcome<ExitCode> run(const VerifyArguments& a) {
     if (!tree) return tree.error();
     const auto mesh = read_mesh_of(tree->view(), a.mesh, a.mesh_options);
     if (!mesh) return mesh.error();
-    describe_mesh(a.mesh, mesh->cleaned.report);
+    describe_mesh(a.mesh, mesh->cleaned.report, tree->view().bake_info().exact);
     if (!mesh->own) note(a.tree, "this tree was baked from another mesh");
     const auto report = [&] {
         ProgressLine line;

@@ -75,7 +75,7 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     }();
     if (built && interrupted()) built = Error{ErrorCode::cancelled};
     if (!built) return failure_of(a.mesh, built.error());
-    describe_mesh(a.mesh, built->mesh);
+    describe_mesh(a.mesh, built->mesh, options->exact);
     Baked baked{Source::baked, std::move(built->tree), built->mesh, {}};
     for (const LevelReport& level : built->levels) baked.level_seconds.push_back(level.seconds);
     return baked;

@@ -36,7 +36,8 @@ struct MeshReport {
     uint32_t merged_vertices = 0; ///< vertices that lay exactly on an earlier one
     uint32_t unused_vertices = 0; ///< vertices of no kept triangle
     /// Vertices that were moved onto another one within the weld tolerance, and how far at most, metres. The cover
-    /// holds the triangles as they stood before, too: bake and proof add this distance to the mesh.
+    /// holds the triangles as they stood before, too: bake and proof add this distance to the mesh. An exact tree,
+    /// though, has the joined triangles, and its answers are for these.
     uint32_t welded_vertices = 0;
     double weld_distance = 0;
     /// Of zero area. Those with a repeated corner are dropped if their points lie in other triangles; the rest stay, so
@@ -59,6 +60,8 @@ struct CleanMesh {
 
 /// The weld tolerance that clean() chooses itself: eight times the spacing of floats at the largest coordinate.
 inline constexpr float kDefaultWeld = -1;
+/// That tolerance, metres, where no coordinate is larger than this.
+double default_weld(float largest_coordinate) noexcept;
 
 /// Merges vertices of equal position, drops redundant triangles and unused vertices, and classifies the edges. What
 /// stays keeps its order.

@@ -9,7 +9,9 @@
 // on; lanes that are left over hold no node, so slots are not consecutive from family to family: is_node() tells.
 //
 // An *exact* tree also holds the triangles of its mesh, a few in each leaf. Its ellipsoids cover these triangles, not
-// what they enclose, and only cull; queries answer as the triangles do.
+// what they enclose, and only cull; queries answer as the triangles do. These are the triangles as clean() leaves them
+// (mesh.hpp): where it joined vertices that nearly met, they stand up to the weld tolerance from where the file has
+// them.
 //
 // The bytes are the object: open() checks them once, allocates nothing, and every later access is memory-safe and
 // finite whatever the bytes hold. src/FORMAT.md is the normative description.
