@@ -96,7 +96,7 @@ std::string without_escapes(std::string_view uri) {
 
 // ---- numbers ----
 
-uint64_t component_size(const GltfValue& component) {
+uint64_t size_of_component(const GltfValue& component) {
     switch (component.whole()) {
     case 5120:
     case 5121:
@@ -219,9 +219,12 @@ std::vector<double> GltfDocument::rows(const GltfValue& accessor_index, Rows kin
     const GltfValue accessor = named("accessors", accessor_index);
     const std::string_view type = kind == Rows::scalar ? "SCALAR" : kind == Rows::vec3 ? "VEC3" : "VEC4";
     if (accessor["type"].text() != type) accessor["type"].fail("an accessor of another type than its use needs");
-    component_size(accessor["componentType"]);
-    const Layout layout{accessor.whole("byteOffset", 0), accessor["componentType"].whole(), accessor["count"].whole(),
-                        static_cast<uint64_t>(kind), accessor.has("normalized") && accessor["normalized"].truth()};
+    const Layout layout{.offset = accessor.whole("byteOffset", 0),
+                        .component = accessor["componentType"].whole(),
+                        .component_size = size_of_component(accessor["componentType"]),
+                        .count = accessor["count"].whole(),
+                        .width = static_cast<uint64_t>(kind),
+                        .normalised = accessor.has("normalized") && accessor["normalized"].truth()};
     std::vector<double> out;
     if (accessor.has("bufferView")) {
         out = read_view(accessor["bufferView"], layout, accessor);
@@ -238,16 +241,19 @@ std::vector<double> GltfDocument::rows(const GltfValue& accessor_index, Rows kin
 
 void GltfDocument::fill_in(const GltfValue& sparse, const Layout& layout, std::vector<double>& rows) {
     const GltfValue indices = sparse["indices"], values = sparse["values"];
-    const uint64_t count = sparse["count"].whole(), width = layout.width;
-    component_size(indices["componentType"]);
-    const auto at =
-        read_view(indices["bufferView"],
-                  {indices.whole("byteOffset", 0), indices["componentType"].whole(), count, 1, false}, indices);
-    const auto to =
-        read_view(values["bufferView"],
-                  {values.whole("byteOffset", 0), layout.component, count, width, layout.normalised}, values);
-    for (size_t i = 0; i < count; ++i) {
-        if (!(at[i] >= 0 && at[i] < static_cast<double>(layout.count)))
+    const Layout of_indices{.offset = indices.whole("byteOffset", 0),
+                            .component = indices["componentType"].whole(),
+                            .component_size = size_of_component(indices["componentType"]),
+                            .count = sparse["count"].whole(),
+                            .width = 1,
+                            .normalised = false};
+    Layout of_values = layout;
+    of_values.offset = values.whole("byteOffset", 0), of_values.count = of_indices.count;
+    const auto at = read_view(indices["bufferView"], of_indices, indices);
+    const auto to = read_view(values["bufferView"], of_values, values);
+    const uint64_t width = layout.width;
+    for (size_t i = 0; i < at.size(); ++i) {
+        if (!(at[i] >= 0 && at[i] < static_cast<double>(layout.count) && at[i] == std::floor(at[i])))
             indices.fail("an index beyond the accessor's count");
         std::copy_n(to.begin() + static_cast<ptrdiff_t>(i * width), width,
                     rows.begin() + static_cast<ptrdiff_t>(static_cast<uint64_t>(at[i]) * width));
@@ -259,7 +265,7 @@ std::vector<double> GltfDocument::read_view(const GltfValue& view_index, const L
     const std::string_view data = buffer(view["buffer"]);
     const uint64_t begin = view.whole("byteOffset", 0), length = view["byteLength"].whole();
     if (begin > data.size() || length > data.size() - begin) view.fail("a buffer view that reaches beyond its buffer");
-    const uint64_t size = layout.component < 5122 ? 1 : layout.component < 5125 ? 2 : 4, row = size * layout.width;
+    const uint64_t size = layout.component_size, row = size * layout.width;
     const uint64_t stride = view.whole("byteStride", row);
     if (stride < row) view["byteStride"].fail("a stride of less than a row");
     // In this order, so that nothing overflows.

@@ -63,7 +63,7 @@ public:
 
 private:
     struct Layout { // of numbers in a buffer view
-        uint64_t offset, component, count, width;
+        uint64_t offset, component, component_size, count, width;
         bool normalised;
     };
     std::vector<double> read_view(const GltfValue& view_index, const Layout& layout, const GltfValue& owner);

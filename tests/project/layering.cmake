@@ -55,7 +55,7 @@ set(cli_libraries
 set(extra_include/prolate/eigen.hpp "Eigen/.*")
 set(extra_include/prolate/glm.hpp "glm/.*")
 set(extra_include/prolate/tbb.hpp "oneapi/tbb/.*")
-set(extra_builder/import_collada.cpp "pugixml\\.hpp")
+set(extra_builder/collada_document.hpp "pugixml\\.hpp")
 set(extra_builder/gltf_document.hpp "nlohmann/.*")
 set(extra_builder/import_3mf.cpp "Model/COM/.*")
 

@@ -76,7 +76,7 @@ plant(bad builder/planted.cpp "#include \"query/ellipsoid/separation.hpp\"")
 plant(bad builder/planted.cpp "#include <glm/vec3.hpp>")
 plant(bad builder/planted.cpp "#include <prolate/glm.hpp>")
 plant(bad builder/planted.cpp "#include <pugixml.hpp>")
-plant(good builder/import_collada.cpp "#include <pugixml.hpp>")
+plant(good builder/collada_document.hpp "#include <pugixml.hpp>")
 plant(good builder/planted.cpp "#include <Eigen/Dense>")
 plant(good builder/planted.cpp "#include <prolate/verify.hpp>")
 # src knows neither side.
