@@ -3,7 +3,7 @@
 #include "builder/verify_bounding.hpp"
 
 #include "src/block.hpp"
-#include "src/bytes.hpp"
+#include "src/block_box.hpp"
 #include "src/nested.hpp"
 #include "src/power_of_two.hpp"
 
@@ -14,20 +14,17 @@ namespace {
 
 // Does a node's box, as queries take it, hold an ellipsoid? Its sides are exact in double; extents round by 4 u.
 bool box_holds(const TreeView& tree, uint32_t node, const Ellipsoid& e) {
-    const std::byte* const block = tree.bounding_block(node / kBlockLanes);
+    const BlockBoxes boxes(tree.bounding_block(node / kBlockLanes));
     const uint32_t lane = node % kBlockLanes;
     const LatticeInfo lattice = tree.lattice();
     const double step = power_of_two(lattice.step_exponent), center[3] = {e.center.x, e.center.y, e.center.z};
     const double half[3] = {e.l11, std::hypot(e.l21, e.l22), std::hypot(e.l31, e.l32, e.l33)};
     for (size_t i = 0; i < 3; ++i) {
-        const double origin =
-            static_cast<double>(lattice.origin[i]) + load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
-        const double unit = power_of_two(load_le<uint8_t>(block + kBlockBoxExponent + i));
-        const auto side = [&](size_t array) {
-            return (origin + unit * load_le<uint8_t>(block + array + kBlockLanes * i + lane)) * step;
-        };
+        const double origin = static_cast<double>(lattice.origin[i]) + boxes.origin(i), unit = boxes.step(i);
+        const double low = (origin + unit * boxes.low(i, lane)) * step,
+                     high = (origin + unit * boxes.high(i, lane)) * step;
         const double reach = half[i] * (1 + 0x1p-50);
-        if (!(side(kBlockBoxLow) <= center[i] - reach && center[i] + reach <= side(kBlockBoxHigh))) return false;
+        if (!(low <= center[i] - reach && center[i] + reach <= high)) return false;
     }
     return true;
 }

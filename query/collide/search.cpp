@@ -130,7 +130,7 @@ private:
             const std::byte* const block = side.block(slot);
             const uint32_t at = slot % kBlockLanes;
             if (side.hulls == nullptr || load_le<uint8_t>(block + kBlockCount + at) >= kTriangleLeaf) return width;
-            return hull_reach_here(hull_of(side.hulls, block, at), x, y, z, width);
+            return hull_reach(hull_of(side.hulls, block, at), x, y, z, width);
         };
         const float a = kept.a[lane], b = kept.b[lane];
         const float reach_a =

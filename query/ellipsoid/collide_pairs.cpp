@@ -15,7 +15,7 @@
 // than |L1| + |L2| + margin the bodies are apart by more than the margin anyway; else P <= |n| (|L1| + |L2| + margin).
 // So it suffices to ask for more than |nx| + |ny| + |nz| times slacks that contain 15 v |L| each, and times (1 + 8 v)
 // margin: 13.5 v and 6 v are needed, the rest pays for the rounding of the bounds. Squares that underflow make a and b
-// too small by at most 2^-62 each: kUnderflow.
+// too small by at most 2^-62 each: kLengthUnderflow.
 //
 // Overlap, the quick test: mu and lambda as computed are exact numbers; N = mu Q1 + lambda Q2, with Q of the exact
 // bodies, has trace 1 +- 6 v, and certificate (2) reads t1 = mu |L1^T m| / det N <= 1 and t2 = lambda |L2^T m| / det N
@@ -79,73 +79,70 @@ namespace prolate::query::HWY_NAMESPACE {
 
 // Weights of both matrices in N, which make its trace 1; rho = lambda / mu.
 struct Weights {
-    F mu, lambda;
+    Float mu, lambda;
 };
-HWY_INLINE F first_rho(const Pairs& p) {
+HWY_INLINE Float first_rho(const PairLanes& p) {
     return p.a.size / p.b.size; // that of two spheres
 }
-HWY_INLINE Weights first_weights(const Pairs& p) { // for that rho, with one division less
-    const F k = set(1) / (p.a.size * p.b.size * (p.a.size + p.b.size));
+HWY_INLINE Weights first_weights(const PairLanes& p) { // for that rho, with one division less
+    const Float k = 1 / (p.a.size * p.b.size * (p.a.size + p.b.size));
     return {p.b.size * k, p.a.size * k};
 }
-HWY_INLINE Weights weights_of(const Pairs& p, F rho) {
-    const F mu = set(1) / (trace(p.q1) + rho * trace(p.q2));
+HWY_INLINE Weights weights_of(const PairLanes& p, Float rho) {
+    const Float mu = 1 / (trace(p.q1) + rho * trace(p.q2));
     return {mu, rho * mu};
 }
 
 // What both quick tests have to leave room for.
 struct Limits {
-    F gap;   // times |mx| + |my| + |mz|
-    F error; // of |L^T m|
-    HWY_INLINE Limits(const Pairs& p, float margin)
-        : gap(p.slack + set(margin)), error(p.slack * p.slack * set(1 / (6 * kV)) + set(kUnderflow)) {}
+    Float gap;   // times |mx| + |my| + |mz|
+    Float error; // of |L^T m|
+    HWY_INLINE Limits(const PairLanes& p, float margin)
+        : gap(p.slack + margin), error(p.slack * p.slack * (1 / (6 * kV)) + kLengthUnderflow) {}
 };
 
 // What one evaluation leaves behind.
 struct Evaluation {
-    Symmetric adj; // of N
-    F mu, lambda, det;
-    Vector wa, wb;  // L^T m
-    F aa, bb, a, b; // their lengths
-    F p;            // m.r
+    Sym3 adj; // of N
+    Float mu, lambda, det;
+    Float3 wa, wb;      // L^T m
+    Float aa, bb, a, b; // their lengths
+    Float p;            // m.r
     Mask separated, overlapping;
 };
 
-HWY_INLINE Evaluation evaluate(const Pairs& p, const Weights& weights, const Limits& limits) {
+HWY_INLINE Evaluation evaluate(const PairLanes& p, const Weights& weights, const Limits& limits) {
     Evaluation e{};
     e.mu = weights.mu, e.lambda = weights.lambda;
-    const Symmetric q = p.combine(e.mu, e.lambda);
+    const Sym3 q = p.combine(e.mu, e.lambda);
     e.adj = adjugate(q);
-    e.det = q.xx * e.adj.xx + q.xy * e.adj.xy + q.xz * e.adj.xz;
-    const Vector m = e.adj * p.r;
-    e.wa = p.a.transposed_times(m), e.wb = p.b.transposed_times(m);
-    e.aa = dot(e.wa, e.wa), e.bb = dot(e.wb, e.wb), e.a = hn::Sqrt(e.aa), e.b = hn::Sqrt(e.bb);
-    const F length = hn::Abs(m.x) + hn::Abs(m.y) + hn::Abs(m.z);
+    e.det = determinant(q, e.adj);
+    const Float3 m = e.adj * p.r;
+    e.wa = transposed_times(p.a.factor, m), e.wb = transposed_times(p.b.factor, m);
+    e.aa = dot(e.wa, e.wa), e.bb = dot(e.wb, e.wb), e.a = sqrt(e.aa), e.b = sqrt(e.bb);
     e.p = dot(m, p.r);
-    e.separated = hn::Gt(e.p - e.a - e.b, limits.gap * length + set(kUnderflow));
-    const F room = e.det - set(32 * kV);
-    e.overlapping = hn::And(hn::Le(e.mu * (e.a + limits.error), room), hn::Le(e.lambda * (e.b + limits.error), room));
+    e.separated = e.p - e.a - e.b > limits.gap * one_norm(m) + kLengthUnderflow;
+    const Float room = e.det - 32 * kV;
+    e.overlapping = (e.mu * (e.a + limits.error) <= room) & (e.lambda * (e.b + limits.error) <= room);
     return e;
 }
 
 // The careful test. Products with mu are about 1, whatever the unit of lengths.
-HWY_INLINE Mask overlapping(const Pairs& p, const Evaluation& e) {
-    const F both = e.a + e.b, at = (e.a + set(kUnderflow)) * e.mu * (both * e.mu) * set(1 + 16 * kV);
-    return hn::And(hn::And(hn::Le(hn::Abs(e.p), both), hn::Gt(at, set(0x1p-90f))),
-                   hn::Le(radial_in_b(p, e.wa * e.mu * (e.p * e.mu), at), set(1)));
+HWY_INLINE Mask overlapping(const PairLanes& p, const Evaluation& e) {
+    const Float both = e.a + e.b, at = (e.a + kLengthUnderflow) * e.mu * (both * e.mu) * (1 + 16 * kV);
+    return (abs(e.p) <= both) & (at > 0x1p-90f) & (radial_in_b(p, e.wa * e.mu * (e.p * e.mu), at) <= 1);
 }
 
 // Newton's step of separation.cpp, brought to one fraction: with c = rho b^2 and h = rho^2 w.adj(Q) w / det(Q), w = Q2
 // n, it is (a - rho b) / (a + rho b) * a^2 c / ((c - h) (c + a^2)).
-HWY_INLINE F next(const Pairs& p, const Evaluation& e, F rho) {
-    const Vector w = p.b.times(e.wb);
-    const F c = rho * e.bb, cd = c * e.det, least = set(0x1p-12f) * cd;
-    const F difference = cd - rho * e.lambda * dot(w, e.adj * w);
-    const F rest = hn::IfThenElse(hn::Gt(difference, least), difference, least);
-    const F step = (e.a - rho * e.b) * e.aa * cd / ((e.a + rho * e.b) * (c + e.aa) * rest);
-    const F most = set(0.9f), floor = set(-0.9f);
-    const F bounded = hn::IfThenElse(hn::Lt(step, most), hn::IfThenElse(hn::Gt(step, floor), step, floor), most);
-    return rho * ((set(1) + bounded) / (set(1) - bounded));
+HWY_INLINE Float next(const PairLanes& p, const Evaluation& e, Float rho) {
+    const Float3 w = p.b.factor * e.wb;
+    const Float c = rho * e.bb, cd = c * e.det, least = 0x1p-12f * cd;
+    const Float difference = cd - rho * e.lambda * dot(w, e.adj * w);
+    const Float rest = greater(least, difference);
+    const Float step = (e.a - rho * e.b) * e.aa * cd / ((e.a + rho * e.b) * (c + e.aa) * rest);
+    const Float bounded = choose(step < 0.9f, greater(set(-0.9f), step), set(0.9f));
+    return rho * ((1 + bounded) / (1 - bounded));
 }
 
 class Batch {
@@ -159,11 +156,11 @@ public:
             const auto count = static_cast<uint32_t>(std::min(kChunk, pairs_.size() - begin));
             waiting_.count = 0;
             uint32_t undecided = 0; // of a group, after its first evaluation
-            for (uint32_t first = 0; first < count; first += static_cast<uint32_t>(width())) {
-                const uint32_t size = std::min(count - first, static_cast<uint32_t>(width()));
-                undecided = undecided > width() / 4 ? many(first, size) : one(first, size);
+            for (uint32_t first = 0; first < count; first += static_cast<uint32_t>(kFloatLanes)) {
+                const uint32_t size = std::min(count - first, static_cast<uint32_t>(kFloatLanes));
+                undecided = undecided > kFloatLanes / 4 ? many(first, size) : one(first, size);
             }
-            for (size_t first = 0; first < waiting_.count; first += width()) go_on(first);
+            for (size_t first = 0; first < waiting_.count; first += kFloatLanes) go_on(first);
         }
         return stats_;
     }
@@ -172,9 +169,9 @@ private:
     // First evaluation of `size` pairs from `first` on. Returns how many stay undecided.
     HWY_INLINE uint32_t one(uint32_t first, uint32_t size) {
         IndexPair repeated[8];
-        const Pairs p(bodies_.world.data(), full(first, size, repeated));
+        const PairLanes p(bodies_.world.data(), full(first, size, repeated));
         const Evaluation e = evaluate(p, first_weights(p), Limits(p, lane_margin_));
-        uint32_t left = ((1u << size) - 1) & ~bits(hn::Or(e.separated, e.overlapping));
+        uint32_t left = ((1u << size) - 1) & ~bits(e.separated | e.overlapping);
         if (left != 0) left &= ~bits(overlapping(p, e));
         write(first, size, bits(e.separated));
         const auto undecided = static_cast<uint32_t>(std::popcount(left));
@@ -186,8 +183,8 @@ private:
     // The pairs from `first` on; lanes without a pair repeat the last one.
     HWY_INLINE const IndexPair* full(uint32_t first, uint32_t size, IndexPair repeated[8]) const {
         const IndexPair* const pairs = pairs_.data() + begin_ + first;
-        if (size == width()) return pairs;
-        for (uint32_t i = 0; i < width(); ++i) repeated[i] = pairs[std::min(i, size - 1)];
+        if (size == kFloatLanes) return pairs;
+        for (uint32_t i = 0; i < kFloatLanes; ++i) repeated[i] = pairs[std::min(i, size - 1)];
         return repeated;
     }
 
@@ -209,23 +206,23 @@ private:
     // The same, and on, while more than a quarter are undecided.
     HWY_NOINLINE uint32_t many(uint32_t first, uint32_t size) {
         IndexPair repeated[8];
-        const Pairs p(bodies_.world.data(), full(first, size, repeated));
+        const PairLanes p(bodies_.world.data(), full(first, size, repeated));
         const Limits limits(p, lane_margin_);
         uint32_t left = (1u << size) - 1, separated = 0, done = 0, undecided = 0;
-        F rho = first_rho(p);
+        Float rho = first_rho(p);
         for (Weights weights = first_weights(p);; weights = weights_of(p, rho)) {
             stats_.evaluations += static_cast<uint32_t>(std::popcount(left));
             const Evaluation e = evaluate(p, weights, limits);
             separated |= left & bits(e.separated);
-            left &= ~bits(hn::Or(hn::Or(e.separated, e.overlapping), overlapping(p, e)));
+            left &= ~bits(e.separated | e.overlapping | overlapping(p, e));
             if (done == 0) undecided = static_cast<uint32_t>(std::popcount(left));
             ++done;
             rho = next(p, e, rho);
-            if (static_cast<size_t>(std::popcount(left)) <= width() / 4 || done == kMaxLaneEvaluations) break;
+            if (static_cast<size_t>(std::popcount(left)) <= kFloatLanes / 4 || done == kMaxLaneEvaluations) break;
         }
         write(first, size, separated);
         float rhos[8];
-        hn::StoreU(rho, Lanes(), rhos);
+        store_unaligned(rho, rhos);
         for (; left != 0; left &= left - 1) {
             const auto lane = static_cast<uint32_t>(std::countr_zero(left));
             waiting_.add(first + lane, done, rhos[lane]);
@@ -235,23 +232,23 @@ private:
 
     // The rest of the evaluations of the pairs that wait at `first` and behind.
     void go_on(size_t first) {
-        const size_t size = std::min(width(), waiting_.count - first);
+        const size_t size = std::min(kFloatLanes, waiting_.count - first);
         IndexPair pairs[8];
         float rhos[8], done[8];
-        for (size_t i = 0; i < width(); ++i) {
+        for (size_t i = 0; i < kFloatLanes; ++i) {
             const size_t j = first + std::min(i, size - 1);
             pairs[i] = pairs_[begin_ + waiting_.at[j]];
             rhos[i] = waiting_.rho[j], done[i] = static_cast<float>(waiting_.done[j]);
         }
-        const Pairs p(bodies_.world.data(), pairs);
+        const PairLanes p(bodies_.world.data(), pairs);
         const Limits limits(p, lane_margin_);
-        F times = hn::LoadU(Lanes(), done); // evaluated
-        const Mask anew = hn::Eq(times, set(0));
-        F rho = choose(anew, first_rho(p), hn::LoadU(Lanes(), rhos));
+        Float times = load_unaligned(done); // evaluated
+        const Mask anew = times == 0;
+        Float rho = choose(anew, first_rho(p), load_unaligned(rhos));
         const Weights from_start = first_weights(p), from_rho = weights_of(p, rho);
         Weights weights{choose(anew, from_start.mu, from_rho.mu), choose(anew, from_start.lambda, from_rho.lambda)};
         for (uint32_t left = (1u << size) - 1; left != 0; weights = weights_of(p, rho)) {
-            uint32_t exhausted = left & bits(hn::Ge(times, set(kMaxLaneEvaluations)));
+            uint32_t exhausted = left & bits(times >= kMaxLaneEvaluations);
             left &= ~exhausted;
             for (; exhausted != 0; exhausted &= exhausted - 1)
                 in_double(waiting_.at[first + static_cast<size_t>(std::countr_zero(exhausted))]);
@@ -259,8 +256,8 @@ private:
             const Evaluation e = evaluate(p, weights, limits);
             for (uint32_t separated = left & bits(e.separated); separated != 0; separated &= separated - 1)
                 verdict_of(waiting_.at[first + static_cast<size_t>(std::countr_zero(separated))]) = Verdict::separated;
-            times = times + set(1);
-            left &= ~bits(hn::Or(hn::Or(e.separated, e.overlapping), overlapping(p, e)));
+            times = times + 1;
+            left &= ~bits(e.separated | e.overlapping | overlapping(p, e));
             rho = next(p, e, rho);
         }
     }

@@ -8,7 +8,7 @@
 // Rounding, v = 2^-24, P and slack as in collide_pairs.cpp, except that 6 v |L| is taken off each slack, which is for
 // centers that are near each other; s is the sum of both.
 //   n                    scaled to length 1 +- 4 v; the gap of n / |n| differs by 5 v |g| <= 5 v P
-//   lower bound          g - s - 7 v P for n (collide_pairs.cpp), less 5 v P: 12 v P, and kUnderflow for a and b
+//   lower bound          g - s - 7 v P for n (collide_pairs.cpp), less 5 v P: 12 v P, and kLengthUnderflow for a and b
 //   x1, x2               L (w / |w|) for the float w is exact but for 3 v |L| of the product, 3.5 v |L| of the length
 //                        and v |L| of the quotient; what the bodies bring, and all this, is at most the slack
 //   x2 - x1              r, two differences and the length: 3 v (|r| + |L1| + |L2|) + 2.5 v |x2 - x1|
@@ -34,133 +34,150 @@ namespace prolate::query::HWY_NAMESPACE {
 constexpr uint32_t kMaxDistanceEvaluations = 8;
 constexpr float kLargest = 1.8f; // step in logarithms of rho and sigma
 
-HWY_INLINE F at_least(F x, float least) { // NaN gives least
-    return hn::IfThenElse(hn::Gt(x, set(least)), x, set(least));
+HWY_INLINE Float at_least(Float x, float least) { // NaN gives least
+    return greater(set(least), x);
 }
-HWY_INLINE F bounded_step(F x) {
-    return at_least(choose(hn::Lt(x, set(kLargest)), x, set(kLargest)), -kLargest);
+HWY_INLINE Float bounded_step(Float x) {
+    return at_least(choose(x < kLargest, x, set(kLargest)), -kLargest);
 }
-HWY_INLINE F rough_exp(F x) {
-    return (set(2) + x) / (set(2) - x);
+HWY_INLINE Float rough_exp(Float x) {
+    return (2 + x) / (2 - x);
 }
 
 // What one evaluation gives to a pair that it finishes.
 struct Answer {
-    F lower, upper;
-    Vector normal, point_a, point_b;
+    Float lower, upper;
+    Float3 normal, point_a, point_b;
 };
 
 class DistanceLanes {
 public:
     HWY_INLINE DistanceLanes(const WorldEllipsoid* bodies, const IndexPair* pairs, float tolerance)
-        : p_(bodies, pairs), tolerance_(set(tolerance)), slack_(p_.slack - set(6 * kV) * (p_.a.size + p_.b.size)) {
-        const F third = set(0.57735f), width_a = p_.a.size * third, width_b = p_.b.size * third;
+        : p_(bodies, pairs), tolerance_(set(tolerance)), slack_(p_.slack - 6 * kV * (p_.a.size + p_.b.size)) {
+        const Float width_a = p_.a.size * 0.57735f, width_b = p_.b.size * 0.57735f;
         rho_ = best_rho_ = p_.a.size / p_.b.size; // that of two spheres
-        sigma_ = width_a * at_least(hn::Sqrt(dot(p_.r, p_.r)) - width_a - width_b, 0);
+        sigma_ = width_a * at_least(length(p_.r) - width_a - width_b, 0);
         best_sigma_ = depth_ = set(0), best_gap_ = set(-3e38f);
-        inside_ = hn::Lt(rho_, set(0)); // none
+        inside_ = rho_ < 0; // none
     }
 
     // One evaluation and the step to the next. True in lanes whose answer is good enough.
     HWY_INLINE Mask evaluate(Answer& out) {
-        const F mu = set(1) / (trace(p_.q1) + rho_ * trace(p_.q2) + set(3) * sigma_), lambda = rho_ * mu,
-                nu = sigma_ * mu;
-        Symmetric q = p_.combine(mu, lambda);
-        q.xx = q.xx + nu, q.yy = q.yy + nu, q.zz = q.zz + nu;
-        const Symmetric adj = adjugate(q);
-        const F det = q.xx * adj.xx + q.xy * adj.xy + q.xz * adj.xz;
-        const Vector m = adj * p_.r;
-        const F length = hn::Sqrt(dot(m, m));
-        const Vector n = m * (set(1) / length);
-        const Vector wa = p_.a.transposed_times(n), wb = p_.b.transposed_times(n);
-        const F a = hn::Sqrt(dot(wa, wa)), b = hn::Sqrt(dot(wb, wb)), over_a = set(1) / a, over_b = set(1) / b;
-        const Vector qa = p_.a.times(wa), qb = p_.b.times(wb), xa = qa * over_a, xb = qb * over_b;
-        const Vector between{p_.r.x - xa.x - xb.x, p_.r.y - xa.y - xb.y, p_.r.z - xa.z - xb.z};
-        const F px = n.x * p_.r.x, py = n.y * p_.r.y, pz = n.z * p_.r.z;
-        const F absolute = hn::Abs(px) + hn::Abs(py) + hn::Abs(pz);
-        const F g = px + py + pz - a - b, apart = hn::Sqrt(dot(between, between));
+        const Evaluation e = evaluation();
+        const Float3 xa = e.qa * e.over_a, xb = e.qb * e.over_b, between = p_.r - xa - xb;
+        const Float3 along{e.n.x * p_.r.x, e.n.y * p_.r.y, e.n.z * p_.r.z};
+        const Float g = along.x + along.y + along.z - e.a - e.b, apart = length(between);
 
-        out.lower = g - (slack_ + set(12 * kV) * absolute + set(kUnderflow));
-        const F above = apart + (set(1.5f) * slack_ + set(4 * kV) * (p_.distance() + apart) + set(kUnderflow));
+        out.lower = g - (slack_ + 12 * kV * one_norm(along) + kLengthUnderflow);
+        const Float above = apart + (1.5f * slack_ + 4 * kV * (p_.distance() + apart) + kLengthUnderflow);
         out.upper = choose(inside_, depth_, above);
-        out.normal = n;
-        out.point_a = {p_.a.center.x + xa.x, p_.a.center.y + xa.y, p_.a.center.z + xa.z};
-        out.point_b = {p_.b.center.x - xb.x, p_.b.center.y - xb.y, p_.b.center.z - xb.z};
+        out.normal = e.n;
+        out.point_a = p_.a.center + xa, out.point_b = p_.b.center - xb;
 
         // Outside the bounds themselves must meet. Inside, |x2 - x1| and -g meet where n is stationary, and where M is
         // positive definite that is a minimum of the depth.
-        const F wide = choose(inside_, apart + g, above - out.lower);
-        const Mask definite = hn::And(hn::Gt(det, set(0)), hn::Gt(trace(adj), set(0)));
-        const Mask finished =
-            hn::And(hn::Le(wide, tolerance_), hn::And(definite, hn::Or(inside_, hn::Gt(out.lower, set(0)))));
-        advance(mu, lambda, nu, adj, det, length, n, wa, a, b, over_a, over_b, qa, qb, between, g);
+        const Float wide = choose(inside_, apart + g, above - out.lower);
+        const Mask definite = (e.det > 0) & (trace(e.adj) > 0);
+        const Mask finished = (wide <= tolerance_) & definite & (inside_ | (out.lower > 0));
+        advance(e, between, g);
         return finished;
     }
 
 private:
-    HWY_INLINE void advance(F mu, F lambda, F nu, const Symmetric& adj, F det, F length, const Vector& n,
-                            const Vector& wa, F a, F b, F over_a, F over_b, const Vector& qa, const Vector& qb,
-                            const Vector& between, F g) {
-        // Newton's step of gap.cpp. The first index of j is the equation, the second the unknown.
-        const F inverse = set(-1) / det;
-        const Vector by_rho = (adj * qb) * (lambda * inverse), by_sigma = (adj * n) * (nu * inverse);
-        const F ag = a * g, over_g = set(1) / g;
-        const F f1 = set(2) * (a - rho_ * b) / (a + rho_ * b), f2 = set(2) * (ag - sigma_) / (ag + sigma_);
-        const auto derivatives = [&](const Vector& v, F& d1, F& d2) HWY_ATTR {
-            const F longer = dot(v, n);
-            const F da = (dot(qa, v) * over_a - a * longer) * over_a, db = (dot(qb, v) * over_b - b * longer) * over_b;
-            const F dg = (dot(between, v) - g * longer) * over_g;
+    // M = mu Q1 + lambda Q2 + nu I of trace 1, its adjugate and determinant; the direction n = m / |m|, m = adj(M) r;
+    // and of each body w = L^T n, Q n and |w|.
+    struct Evaluation {
+        Float mu, lambda, nu;
+        Sym3 adj;
+        Float det, length;
+        Float3 n, wa, wb, qa, qb;
+        Float a, b, over_a, over_b;
+    };
+    HWY_INLINE Evaluation evaluation() const {
+        Evaluation e{};
+        e.mu = 1 / (trace(p_.q1) + rho_ * trace(p_.q2) + 3 * sigma_), e.lambda = rho_ * e.mu, e.nu = sigma_ * e.mu;
+        const Sym3 q = plus_diagonal(p_.combine(e.mu, e.lambda), e.nu);
+        e.adj = adjugate(q), e.det = determinant(q, e.adj);
+        const Float3 m = e.adj * p_.r;
+        e.length = length(m), e.n = m * (1 / e.length);
+        e.wa = transposed_times(p_.a.factor, e.n), e.wb = transposed_times(p_.b.factor, e.n);
+        e.a = length(e.wa), e.b = length(e.wb), e.over_a = 1 / e.a, e.over_b = 1 / e.b;
+        e.qa = p_.a.factor * e.wa, e.qb = p_.b.factor * e.wb;
+        return e;
+    }
+
+    // Steps in the logarithms of rho and sigma.
+    struct Steps {
+        Float rho, sigma;
+        Float rho_alone; // where sigma stays 0
+    };
+    // Newton's step of gap.cpp. The first index of j is the equation, the second the unknown.
+    HWY_INLINE Steps newton(const Evaluation& e, const Float3& between, Float g) const {
+        const Float inverse = -1 / e.det;
+        const Float3 by_rho = (e.adj * e.qb) * (e.lambda * inverse), by_sigma = (e.adj * e.n) * (e.nu * inverse);
+        const Float ag = e.a * g, over_g = 1 / g;
+        const Float f1 = 2 * (e.a - rho_ * e.b) / (e.a + rho_ * e.b), f2 = 2 * (ag - sigma_) / (ag + sigma_);
+        const auto derivatives = [&](const Float3& v, Float& d1, Float& d2) HWY_ATTR {
+            const Float longer = dot(v, e.n);
+            const Float da = (dot(e.qa, v) * e.over_a - e.a * longer) * e.over_a,
+                        db = (dot(e.qb, v) * e.over_b - e.b * longer) * e.over_b;
+            const Float dg = (dot(between, v) - g * longer) * over_g;
             d1 = da - db, d2 = da + dg;
         };
-        F j11, j21, j12, j22;
+        Float j11, j21, j12, j22;
         derivatives(by_rho, j11, j21), derivatives(by_sigma, j12, j22);
-        j11 = j11 - set(1), j22 = j22 - set(1);
-        const F over = set(1) / (j11 * j22 - j12 * j21);
-        const F both_rho = (f2 * j12 - f1 * j22) * over, both_sigma = (f1 * j21 - f2 * j11) * over;
+        j11 = j11 - 1, j22 = j22 - 1;
+        const Float over = 1 / (j11 * j22 - j12 * j21);
+        return {(f2 * j12 - f1 * j22) * over, (f1 * j21 - f2 * j11) * over, 0 - f1 / j11};
+    }
+
+    HWY_INLINE void advance(const Evaluation& e, const Float3& between, Float g) {
+        const Steps step = newton(e, between, g);
 
         // Perram and Wertheim's rho alone, as long as there is neither a plane nor a common point.
-        const Mask alone = hn::Eq(sigma_, set(0)), same_side = hn::Gt(g * sigma_, set(0));
-        const F scale = mu * length;
-        const F ta = scale * (a + set(kUnderflow)) / det * set(1 + 16 * kV), tb = radial_in_b(p_, wa * scale, det);
-        const Mask common = hn::And(alone, hn::And(hn::Le(ta, set(1)), hn::Le(tb, set(1))));
-        const F depth = (ta - set(1)) / p_.a.thinness + (tb - set(1)) / p_.b.thinness;
-        depth_ = choose(common, depth * set(1 - 16 * kV), depth_);
-        inside_ = hn::Or(inside_, common);
-        const Mask search = hn::And(alone, hn::Le(g, set(0)));
+        const Mask alone = sigma_ == 0, same_side = g * sigma_ > 0;
+        const Float scale = e.mu * e.length;
+        const Float ta = scale * (e.a + kLengthUnderflow) / e.det * (1 + 16 * kV),
+                    tb = radial_in_b(p_, e.wa * scale, e.det);
+        const Mask common = alone & (ta <= 1) & (tb <= 1);
+        const Float depth = (ta - 1) / p_.a.thinness + (tb - 1) / p_.b.thinness;
+        depth_ = choose(common, depth * (1 - 16 * kV), depth_);
+        inside_ = inside_ | common;
+        const Mask search = alone & (g <= 0) & !common;
 
-        const Mask better = hn::And(same_side, hn::Gt(g, best_gap_));
+        const Mask better = same_side & (g > best_gap_);
         best_gap_ = choose(better, g, best_gap_);
         best_rho_ = choose(better, rho_, best_rho_), best_sigma_ = choose(better, sigma_, best_sigma_);
 
-        const F alone_rho = rho_ * rough_exp(bounded_step(set(0) - f1 / j11));
-        const F newton_rho = rho_ * rough_exp(bounded_step(both_rho)),
-                newton_sigma = sigma_ * rough_exp(bounded_step(both_sigma));
-        const F half_rho = set(0.5f) * (rho_ + best_rho_), half_sigma = set(0.5f) * (sigma_ + best_sigma_);
-        const F there_rho = a * over_b, there_sigma = ag;
+        const Float alone_rho = rho_ * rough_exp(bounded_step(step.rho_alone));
+        const Float newton_rho = rho_ * rough_exp(bounded_step(step.rho)),
+                    newton_sigma = sigma_ * rough_exp(bounded_step(step.sigma));
+        const Float half_rho = 0.5f * (rho_ + best_rho_), half_sigma = 0.5f * (sigma_ + best_sigma_);
+        const Float there_rho = e.a * e.over_b, there_sigma = e.a * g;
         // Where sigma is 0, search or begin; where it has g's sign, go on by Newton's step, or half-way back if that
         // was too far; else no plane has been found after all.
-        rho_ = choose(alone, choose(hn::AndNot(common, search), alone_rho, there_rho),
+        rho_ = choose(alone, choose(search, alone_rho, there_rho),
                       choose(same_side, choose(better, newton_rho, half_rho), there_rho));
-        sigma_ = choose(alone, choose(hn::AndNot(common, search), set(0), there_sigma),
+        sigma_ = choose(alone, choose(search, set(0), there_sigma),
                         choose(same_side, choose(better, newton_sigma, half_sigma), set(0)));
     }
 
-    const Pairs p_;
-    const F tolerance_;
-    const F slack_; // of distances
-    F rho_, sigma_;
-    F best_rho_, best_sigma_, best_gap_; // where the gap was greatest so far
-    F depth_;                            // minus a certified depth, of lanes inside
-    Mask inside_;                        // a common point is known
+    const PairLanes p_;
+    const Float tolerance_;
+    const Float slack_; // of distances
+    Float rho_, sigma_;
+    Float best_rho_, best_sigma_, best_gap_; // where the gap was greatest so far
+    Float depth_;                            // minus a certified depth, of lanes inside
+    Mask inside_;                            // a common point is known
 };
 
 PairStats distance_pairs(const EllipsoidBodies& bodies, std::span<const IndexPair> pairs,
                          std::span<PairDistance> distances, float tolerance) {
     PairStats stats;
-    for (size_t first = 0; first < pairs.size(); first += width()) {
-        const size_t count = std::min(width(), pairs.size() - first);
+    for (size_t first = 0; first < pairs.size(); first += kFloatLanes) {
+        const size_t count = std::min(kFloatLanes, pairs.size() - first);
         IndexPair in_lanes[8];
-        for (size_t i = 0; i < width(); ++i) in_lanes[i] = pairs[first + std::min(i, count - 1)];
+        for (size_t i = 0; i < kFloatLanes; ++i) in_lanes[i] = pairs[first + std::min(i, count - 1)];
         DistanceLanes lanes(bodies.world.data(), in_lanes, tolerance);
         uint32_t left = (1u << count) - 1;
         for (uint32_t done = 0; left != 0 && done < kMaxDistanceEvaluations; ++done) {
@@ -171,10 +188,10 @@ PairStats distance_pairs(const EllipsoidBodies& bodies, std::span<const IndexPai
             left &= ~finished;
             float columns[11][8];
             size_t j = 0;
-            for (const F& x :
+            for (const Float& x :
                  {answer.lower, answer.upper, answer.normal.x, answer.normal.y, answer.normal.z, answer.point_a.x,
                   answer.point_a.y, answer.point_a.z, answer.point_b.x, answer.point_b.y, answer.point_b.z})
-                hn::StoreU(x, Lanes(), columns[j++]);
+                store_unaligned(x, columns[j++]);
             for (; finished != 0; finished &= finished - 1) {
                 const auto i = static_cast<size_t>(std::countr_zero(finished));
                 distances[first + i] = {.lower = columns[0][i],

@@ -1,5 +1,4 @@
-// What the axis tests of axis_lanes-inl.hpp take and give, and the same test on one lane in plain C++: the operations
-// of the SIMD kernel in the same order, so that both give the same bits. Tests compare the two; nothing else uses it.
+// What the axis tests of axis_lanes-inl.hpp take and give.
 #pragma once
 
 #include "query/ellipsoid/placed.hpp"
@@ -29,9 +28,5 @@ LatticePoint lattice_point(const PlacedPoint& point, const LatticeInfo& lattice)
 struct AxisMask {
     uint32_t ahead, behind;
 };
-
-/// The scalar reference, for one lane: bit 0 of a mask stands for it.
-AxisMask axis_mask(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticePoint& point,
-                   uint32_t axis) noexcept;
 
 } // namespace prolate::query

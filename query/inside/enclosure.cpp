@@ -2,8 +2,7 @@
 
 #include "query/inside/inside.hpp"
 #include "query/node/lattice.hpp"
-#include "src/block.hpp"
-#include "src/bytes.hpp"
+#include "src/block_box.hpp"
 
 #include <glm/vector_relational.hpp>
 
@@ -34,17 +33,12 @@ private:
         if (inner_.component_count() != 1) return false;
         const LatticeInfo lattice = outer_.lattice();
         const double step = power_of_two(lattice.step_exponent);
-        const std::byte* const block = outer_.block(0);
+        const BlockBoxes boxes(outer_.block(0));
         glm::dvec3 low, high; // metres, exact
         for (size_t i = 0; i < 3; ++i) {
-            const double origin =
-                static_cast<double>(lattice.origin[i]) + load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
-            const double box_step = power_of_two(load_le<uint8_t>(block + kBlockBoxExponent + i));
-            const auto corner = [&](size_t array) {
-                return (origin + load_le<uint8_t>(block + array + kBlockLanes * i) * box_step) * step;
-            };
-            low[static_cast<glm::length_t>(i)] = corner(kBlockBoxLow);
-            high[static_cast<glm::length_t>(i)] = corner(kBlockBoxHigh);
+            const double origin = static_cast<double>(lattice.origin[i]) + boxes.origin(i), box_step = boxes.step(i);
+            low[static_cast<glm::length_t>(i)] = (origin + boxes.low(i, 0) * box_step) * step;
+            high[static_cast<glm::length_t>(i)] = (origin + boxes.high(i, 0) * box_step) * step;
         }
         for (uint32_t i = 0; i < kSamples; ++i) {
             const auto v = static_cast<uint32_t>(uint64_t{inner_.vertex_count()} * i / kSamples);

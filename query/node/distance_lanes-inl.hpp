@@ -167,12 +167,12 @@ HWY_INLINE double hulls_add(const LaneBounds& at, uint32_t lane, float size, con
     float saved = 0;
     if (hull_one != nullptr) {
         const float reach =
-            hull_reach_here(hull_one, at.in_a[0][lane], at.in_a[1][lane], at.in_a[2][lane], at.width_a[lane]);
+            hull_reach(hull_one, at.in_a[0][lane], at.in_a[1][lane], at.in_a[2][lane], at.width_a[lane]);
         saved += std::max(0.0f, at.reach_a[lane] - (reach + kLaneMargin * size));
     }
     if (hull_lane != nullptr) {
         const float reach =
-            hull_reach_here(hull_lane, -at.in_b[0][lane], -at.in_b[1][lane], -at.in_b[2][lane], at.width_b[lane]);
+            hull_reach(hull_lane, -at.in_b[0][lane], -at.in_b[1][lane], -at.in_b[2][lane], at.width_b[lane]);
         saved += std::max(0.0f, at.reach_b[lane] - (reach + kLaneMargin * at.size[lane]));
     }
     return double{saved} * (1 - 0x1p-20);

@@ -1,6 +1,6 @@
 // Hulls of exact trees' inner nodes (src/hull.hpp) along the direction that a lane found: a closer look at a pair of
 // nodes that an ellipsoid, and boxes, could not part. Per SIMD target; include it below hwy/foreach_target.h.
-// hull_reach() in query/node/lanes.cpp does the same operations in plain C++.
+// The tests have a scalar reference.
 //
 // With the terms of lanes-inl.hpp the nodes are apart if
 //     p - A - B > 0,   A = max v.w_i + share |v|, v = L1^T n,   B likewise with v = -L2^T n
@@ -26,8 +26,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
-/// hull_reach() of lanes.hpp, which has the same operations; v = {x, y, z}.
-HWY_INLINE float hull_reach_here(const std::byte* hull, float x, float y, float z, float width) {
+/// How far what a hull record (src/hull.hpp) describes reaches from its node's center along n: v = {x, y, z} = L^T n,
+/// width = |v|. If the record knows nothing, `width`.
+HWY_INLINE float hull_reach(const std::byte* hull, float x, float y, float z, float width) {
     const float along[3] = {x, y, z};
     const Float3 v = set(along);
     Float most = set(-HUGE_VALF);

@@ -1,6 +1,5 @@
 // The culling test: one ellipsoid against the eight lanes of a block, in single precision. Per SIMD target; include it
-// below hwy/foreach_target.h. lane_gap() in query/node/lanes.cpp does the same operations on one
-// lane in plain C++.
+// below hwy/foreach_target.h. The tests have a scalar reference.
 //
 // The mathematics is that of query/ellipsoid/separation.hpp: with r = c2 - c1 and Q = w1 Q1 + w2 Q2, the direction
 //     n = adj(Q) r,     w1 : w2 = 1/|L1| : 1/|L2| (exact for spheres), scaled so that trace(Q) = 1,

@@ -116,45 +116,4 @@ bool boxes_apart(const std::byte* block, uint32_t lane, const Single& s, float m
     return apart;
 }
 
-LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& s) noexcept {
-    const LaneNode e = load_node(block, lane, step_exponent);
-    const auto dot = [](float x, float y, float z, float u, float v, float w) { return x * u + y * v + z * w; };
-    const float xx = e.l11 * e.l11, yx = e.l21 * e.l11, zx = e.l31 * e.l11;
-    const float yy = e.l21 * e.l21 + e.l22 * e.l22, zy = e.l31 * e.l21 + e.l32 * e.l22;
-    const float zz = dot(e.l31, e.l32, e.l33, e.l31, e.l32, e.l33);
-    LaneGap out{};
-    out.size = std::sqrt(xx + yy + zz);
-    const float w2 = 1 / (out.size * (out.size + s.size)), w1 = out.size * w2 * s.weight;
-    const auto mix = [&](float q1, float q2) { return w1 * q1 + w2 * q2; };
-    const float qxx = mix(s.diagonal[0], xx), qyy = mix(s.diagonal[1], yy), qzz = mix(s.diagonal[2], zz);
-    const float qyz = mix(s.off_diagonal[1], zy), qxz = mix(s.off_diagonal[2], zx), qxy = mix(s.off_diagonal[0], yx);
-    const float rx = e.center[0] - s.center[0], ry = e.center[1] - s.center[1], rz = e.center[2] - s.center[2];
-    const float axx = qyy * qzz - qyz * qyz, ayy = qxx * qzz - qxz * qxz, azz = qxx * qyy - qxy * qxy;
-    const float axy = qxz * qyz - qxy * qzz, axz = qxy * qyz - qxz * qyy, ayz = qxy * qxz - qxx * qyz;
-    const float x = dot(axx, axy, axz, rx, ry, rz), y = dot(axy, ayy, ayz, rx, ry, rz),
-                z = dot(axz, ayz, azz, rx, ry, rz);
-    const auto along = [&](size_t c) { return dot(s.factor[c][0], s.factor[c][1], s.factor[c][2], x, y, z); };
-    const float a1 = along(0), a2 = along(1), a3 = along(2);
-    const float b1 = dot(e.l11, e.l21, e.l31, x, y, z), b2 = e.l22 * y + e.l32 * z, b3 = e.l33 * z;
-    const float a = std::sqrt(a1 * a1 + a2 * a2 + a3 * a3), b = std::sqrt(b1 * b1 + b2 * b2 + b3 * b3);
-    const float p = dot(x, y, z, rx, ry, rz), sum = a + b, length = std::abs(x) + std::abs(y) + std::abs(z);
-    out.gap = p - sum - (s.slack + kLaneMargin * out.size) * length;
-    out.square = x * x + y * y + z * z;
-    out.depth = p / sum;
-    if (!(length > kLaneDirection)) out.gap = 0;
-    return out;
-}
-
-float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept {
-    float most = -HUGE_VALF;
-    for (size_t i = 0; i < kHullPoints; ++i) {
-        const auto along = [&](size_t k) {
-            return static_cast<float>(load_le<int8_t>(hull + kHullPoint + kHullPoints * k + i)) * v[k];
-        };
-        most = std::max(most, along(0) + along(1) + along(2));
-    }
-    const auto share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
-    return share > 0 ? most * kPerHullUnit + share * kPerHullShare * width : width;
-}
-
 } // namespace prolate::query

@@ -1,5 +1,6 @@
-// What the culling test of lanes-inl.hpp takes and gives, and the same test on one lane in plain C++: the operations of
-// the SIMD kernel in the same order, so that both give the same bits. Tests compare the two; nothing else uses it.
+// What the culling tests of lanes-inl.hpp take: the node of the other tree, placed in the lattice coordinates of a
+// block. place() and boxes_apart() are plain C++, which Highway's scalar target runs, with the operations of
+// place-inl.hpp and lanes-inl.hpp in the same order: all give the same bits.
 #pragma once
 
 #include "query/node/lattice.hpp"
@@ -96,22 +97,9 @@ Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexc
 /// Is the lane's box certainly apart from that of the single, by more than `margin` along an axis?
 bool boxes_apart(const std::byte* block, uint32_t lane, const Single& single, float margin) noexcept;
 
-/// One lane's outcome.
-struct LaneGap {
-    float gap;    ///< p - a - b less the margin, a multiple of |n|: positive only if they are apart; else possibly NaN
-    float square; ///< |n|^2
-    float depth;  ///< p / (a + b): below 1 they overlap as seen along n, 0 at equal centers
-    float size;   ///< |L2|
-};
-LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& single) noexcept;
-
 /// The record of the inner node in `lane` of `block`, of those that begin at `hulls`; null if that is.
 inline const std::byte* hull_of(const std::byte* hulls, const std::byte* block, uint32_t lane) {
     const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
     return hulls != nullptr ? hulls + size_t{first / kBlockLanes} * kHullBytes : nullptr;
 }
-/// How far what a hull record (src/hull.hpp) describes reaches from its node's center along n: v = L^T n, width = |v|.
-/// If the record knows nothing, `width`.
-float hull_reach(const std::byte* hull, const float (&v)[3], float width) noexcept;
-
 } // namespace prolate::query

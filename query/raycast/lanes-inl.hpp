@@ -1,5 +1,5 @@
 // The culling tests of rays: one ray against the eight lanes of a block, in single precision. Per SIMD target; include
-// it below hwy/foreach_target.h. query/raycast/lanes.cpp does the same operations on one lane in plain C++.
+// it below hwy/foreach_target.h. The tests have scalar references.
 //
 // A ray o + s E, s >= 0, and an ellipsoid {c + L u : |u| <= 1}, r = c - o: with ANY direction n,
 //     every common point has   s n.E >= g,   g = n.r - |L^T n|,                                                    (1)

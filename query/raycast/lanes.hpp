@@ -1,10 +1,8 @@
-// What the ray tests of lanes-inl.hpp take and give, and the same tests on one lane in plain C++: the operations of
-// the SIMD kernels in the same order, so that both give the same bits. Tests compare the two; nothing else uses it.
+// What the ray tests of lanes-inl.hpp take.
 #pragma once
 
 #include "query/inside/axis_lanes.hpp"
 #include "query/node/lanes.hpp"
-
 #include "src/block_box.hpp"
 
 #include <prolate/tree.hpp>
@@ -47,10 +45,5 @@ inline BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
     }
     return out;
 }
-
-/// The scalar references, for one lane.
-float box_entry(const std::byte* block, uint32_t lane, const BoxRay& ray, float limit) noexcept;
-float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticeRay& ray,
-                float limit) noexcept;
 
 } // namespace prolate::query

@@ -1,6 +1,5 @@
 // The culling tests of shapes: one rounded box or half-space against the eight lanes of a block, in single precision.
-// Per SIMD target; include it below hwy/foreach_target.h. query/shapes/lanes.cpp does the same operations on one lane
-// in plain C++.
+// Per SIMD target; include it below hwy/foreach_target.h. The tests have scalar references.
 //
 // The direction n is that of lanes-inl.hpp, for an ellipsoid of about the box's shape. The certificate is the box's
 // own:
@@ -36,7 +35,8 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
 struct LaneGaps {
-    Float gap, key; ///< as ShapeGap
+    Float gap; ///< positive only if they are separated; else possibly NaN
+    Float key; ///< the less, the deeper they overlap
 };
 
 HWY_INLINE LaneGaps shape_gaps(const LaneNodes& e, const LaneRoundedBox& box) {

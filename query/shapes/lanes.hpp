@@ -1,6 +1,4 @@
-// What the culling tests of shapes (shape_lanes-inl.hpp) take and give, and the same tests on one lane in plain C++:
-// the operations of the SIMD kernels in the same order, so that both give the same bits. Tests compare the two; nothing
-// else uses the twins.
+// What the culling tests of lanes-inl.hpp take: shapes in the lattice coordinates of a tree.
 #pragma once
 
 #include "query/node/lanes.hpp"
@@ -26,14 +24,5 @@ struct LaneHalfSpace {
     float slack; ///< the lane-independent part of the margin, a multiple of |n|
 };
 LaneHalfSpace lane_half_space(const PlacedHalfSpace& half_space, const LatticeInfo& lattice) noexcept;
-
-/// One lane's outcome.
-struct ShapeGap {
-    float gap; ///< positive only if they are apart; else possibly NaN
-    float key; ///< the less, the deeper they overlap
-};
-ShapeGap shape_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const LaneRoundedBox& box) noexcept;
-ShapeGap shape_gap(const std::byte* block, uint32_t lane, int32_t step_exponent,
-                   const LaneHalfSpace& half_space) noexcept;
 
 } // namespace prolate::query

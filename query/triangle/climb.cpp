@@ -1,7 +1,7 @@
 #include "query/triangle/climb.hpp"
 
 #include "query/ellipsoid/convert.hpp"
-#include "src/block.hpp"
+#include "src/block_box.hpp"
 #include "src/bytes.hpp"
 #include "src/power_of_two.hpp"
 
@@ -25,19 +25,16 @@ public:
     }
     // Bit i: the box of lane i may hold the point.
     uint32_t lanes(const std::byte* block) const {
+        const BlockBoxes boxes(block);
         uint32_t out = 0xff;
         for (size_t i = 0; i < 3; ++i) {
-            const double per_step = power_of_two(-int32_t{load_le<uint8_t>(block + kBlockBoxExponent + i)});
-            const double x = at_[i] - load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
+            const double per_step = boxes.per_step(i), x = at_[i] - boxes.origin(i);
             // Box steps, the whole ones below and above: rounding is far below the slack.
             const int32_t below = static_cast<int32_t>(std::clamp((x + kSlack) * per_step, -1.0, 255.0) + 1) - 1,
                           above = 256 - static_cast<int32_t>(256 - std::clamp((x - kSlack) * per_step, 0.0, 256.0));
             uint32_t held = 0;
-            for (size_t lane = 0; lane < kBlockLanes; ++lane) {
-                const int32_t low = load_le<uint8_t>(block + kBlockBoxLow + kBlockLanes * i + lane),
-                              high = load_le<uint8_t>(block + kBlockBoxHigh + kBlockLanes * i + lane);
-                held |= static_cast<uint32_t>(low <= below && high >= above) << lane;
-            }
+            for (size_t lane = 0; lane < kBlockLanes; ++lane)
+                held |= static_cast<uint32_t>(boxes.low(i, lane) <= below && boxes.high(i, lane) >= above) << lane;
             out &= held;
         }
         return out;

@@ -2,6 +2,7 @@
 
 #include "query/ellipsoid/convert.hpp"
 #include "src/block.hpp"
+#include "src/block_box.hpp"
 #include "src/bytes.hpp"
 #include "src/hull.hpp"
 #include "src/power_of_two.hpp"
@@ -51,18 +52,15 @@ struct Interval {
 
 // How far the boxes of a block reach along r; what lanes without a node say means nothing.
 void box_reaches(const TreeView& tree, uint32_t b, const dvec3& r, double rounding, Interval (&out)[kBlockLanes]) {
-    const std::byte* const block = tree.bounding_block(b);
+    const BlockBoxes boxes(tree.bounding_block(b));
     const LatticeInfo lattice = tree.lattice();
     const double step = power_of_two(lattice.step_exponent);
     double wide[kBlockLanes] = {}, at[kBlockLanes] = {}, size[kBlockLanes] = {};
     for (size_t k = 0; k < 3; ++k) {
         const double along = r[static_cast<glm::length_t>(k)], across = std::abs(along);
-        const double unit = power_of_two(load_le<uint8_t>(block + kBlockBoxExponent + k) - 1) * step;
-        const double origin =
-            static_cast<double>(lattice.origin[k] + load_le<int32_t>(block + kBlockBoxOrigin + 4 * k));
+        const double unit = boxes.half_step(k) * step, origin = lattice.origin[k] + boxes.origin(k);
         for (size_t i = 0; i < kBlockLanes; ++i) {
-            const int low = load_le<uint8_t>(block + kBlockBoxLow + kBlockLanes * k + i),
-                      high = load_le<uint8_t>(block + kBlockBoxHigh + kBlockLanes * k + i);
+            const int32_t low = boxes.low(k, i), high = boxes.high(k, i);
             const double middle = origin * step + (low + high) * unit, half = (high - low) * unit;
             at[i] += along * middle, wide[i] += across * half, size[i] += std::abs(middle) + half;
         }

@@ -1,5 +1,5 @@
 // The bounds of distance_lanes-inl.hpp: never above the distance, tight, and the same bits on every SIMD target as
-// those of a twin in plain C++.
+// those of a scalar reference.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/query/node/distance_lanes_test.cpp"
 #include "query/simd/targets.hpp"
@@ -312,7 +312,7 @@ struct Bound {
     double lower;
     float size;
 };
-Bound twin(const std::byte* block, uint32_t lane, int32_t step_exponent, const Placed& placed_one) {
+Bound scalar_reference(const std::byte* block, uint32_t lane, int32_t step_exponent, const Placed& placed_one) {
     const Single& s = placed_one.single;
     const PlacedBox& box = placed_one.box;
     const LaneNode e = load_node(block, lane, step_exponent);
@@ -371,7 +371,7 @@ template <class T, size_t N> bool same(const T (&x)[N], const T (&y)[N]) { // th
     return std::equal(x, x + 3, y, [](const T& u, const T& v) { return same(u, v); });
 }
 
-TEST(DistanceLanes, AllTargetsGiveTheBitsOfTheScalarTwin) {
+TEST(DistanceLanes, AllTargetsGiveTheBitsOfTheScalarReference) {
     Random random(20);
     uint32_t near = 0, far = 0;
     for (uint32_t n = 0; n < 3000; ++n) {
@@ -402,7 +402,7 @@ TEST(DistanceLanes, AllTargetsGiveTheBitsOfTheScalarTwin) {
             const double enough = 1000;
             const Bounds bounds = bounds_of(p.a, one, enough);
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const Bound expected = twin(p.a.bytes.data(), lane, p.a.lattice.step_exponent, one);
+                const Bound expected = scalar_reference(p.a.bytes.data(), lane, p.a.lattice.step_exponent, one);
                 ASSERT_TRUE(same(expected.lower, bounds.lower[lane]) && same(expected.size, bounds.size[lane]))
                     << target << " lane " << lane << ": " << expected.lower << " " << bounds.lower[lane];
                 ASSERT_EQ((bounds.near >> lane & 1) != 0, !(expected.lower >= enough)) << target;

@@ -1,5 +1,5 @@
 // The culling test, of ellipsoids and of boxes: never separates what overlaps, and gives the same bits on every SIMD
-// target as its scalar twin.
+// target as its scalar reference.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/query/node/lanes_test.cpp"
 #include "query/simd/targets.hpp"
@@ -10,6 +10,7 @@
 
 #include "src/bytes.hpp"
 #include "tests/query/hunt.hpp"
+#include "tests/query/lane_references.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/targets.hpp"
@@ -43,7 +44,7 @@ uint32_t box_bits(const std::byte* block, const Single& single, float margin) {
 }
 
 float reach_here(const std::byte* hull, float x, float y, float z, float width) {
-    return hull_reach_here(hull, x, y, z, width);
+    return hull_reach(hull, x, y, z, width);
 }
 
 } // namespace prolate::query::HWY_NAMESPACE
@@ -208,7 +209,7 @@ bool same(float x, float y) {
     return std::bit_cast<uint32_t>(x) == std::bit_cast<uint32_t>(y) || (std::isnan(x) && std::isnan(y));
 }
 
-TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarTwin) {
+TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarReference) {
     Random random(7);
     for (uint32_t n = 0; n < 4000; ++n) {
         const Block b = block(random, 1, kFamilies[0]);
@@ -226,18 +227,19 @@ TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarTwin) {
             const uint32_t bits = HWY_DYNAMIC_DISPATCH(lane_gaps)(a.bytes.data(), a.lattice.step_exponent, single, out);
             const uint32_t boxes = HWY_DYNAMIC_DISPATCH(box_bits)(a.bytes.data(), single, 1);
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const LaneGap twin = lane_gap(a.bytes.data(), lane, a.lattice.step_exponent, single);
-                ASSERT_EQ((bits >> lane & 1) != 0, twin.gap > 0) << target;
+                const LaneGap expected = lane_gap(a.bytes.data(), lane, a.lattice.step_exponent, single);
+                ASSERT_EQ((bits >> lane & 1) != 0, expected.gap > 0) << target;
                 ASSERT_EQ((boxes >> lane & 1) == 0, boxes_apart(a.bytes.data(), lane, single, 1)) << target;
-                ASSERT_TRUE(same(twin.square, out[lane].square) && same(twin.depth, out[lane].depth) &&
-                            same(twin.size, out[lane].size) && (twin.gap == 0 || same(twin.gap, out[lane].gap)))
+                ASSERT_TRUE(same(expected.square, out[lane].square) && same(expected.depth, out[lane].depth) &&
+                            same(expected.size, out[lane].size) &&
+                            (expected.gap == 0 || same(expected.gap, out[lane].gap)))
                     << target << " lane " << lane;
             }
         });
     }
 }
 
-TEST(Lanes, AllTargetsGiveTheHullReachOfTheScalarTwin) {
+TEST(Lanes, AllTargetsGiveTheHullReachOfTheScalarReference) {
     Random random(8);
     for (uint32_t n = 0; n < 4000; ++n) {
         std::array<std::byte, kHullBytes> hull;
@@ -246,11 +248,11 @@ TEST(Lanes, AllTargetsGiveTheHullReachOfTheScalarTwin) {
         float v[3];
         for (float& x : v) x = static_cast<float>(random.in(-1, 1) * random.log_in(1e-6, 1e6));
         const auto width = static_cast<float>(hunt::length({v[0], v[1], v[2]}));
-        const float twin = hull_reach(hull.data(), v, width);
-        EXPECT_TRUE(n % 4 != 0 || twin == width);
+        const float expected = hull_reach(hull.data(), v, width);
+        EXPECT_TRUE(n % 4 != 0 || expected == width);
         targets::for_each([&](const char* target) {
             const float reach = HWY_DYNAMIC_DISPATCH(reach_here)(hull.data(), v[0], v[1], v[2], width);
-            ASSERT_EQ(std::bit_cast<uint32_t>(reach), std::bit_cast<uint32_t>(twin)) << target;
+            ASSERT_EQ(std::bit_cast<uint32_t>(reach), std::bit_cast<uint32_t>(expected)) << target;
         });
     }
 }

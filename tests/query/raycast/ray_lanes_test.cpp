@@ -9,6 +9,7 @@
 #include "query/raycast/lanes-inl.hpp"
 
 #include "tests/query/blocks.hpp"
+#include "tests/query/lane_references.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/targets.hpp"
@@ -339,23 +340,25 @@ TEST(RayLanes, SameBitsOnEveryTargetAndInPlainCode) {
             float entries[kBlockLanes];
             HWY_DYNAMIC_DISPATCH(block_entries)(b.bytes.data(), step, ray, 0.75f, entries);
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const float twin = ray_entry(b.bytes.data(), lane, step, ray, 0.75f);
-                ASSERT_EQ(std::bit_cast<uint32_t>(twin), std::bit_cast<uint32_t>(entries[lane])) << name << ' ' << n;
+                const float expected = ray_entry(b.bytes.data(), lane, step, ray, 0.75f);
+                ASSERT_EQ(std::bit_cast<uint32_t>(expected), std::bit_cast<uint32_t>(entries[lane]))
+                    << name << ' ' << n;
             }
             for (uint32_t axis = 0; axis < 3; ++axis) {
                 const AxisMask mask = HWY_DYNAMIC_DISPATCH(block_mask)(b.bytes.data(), step, origin, axis);
                 for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                    const AxisMask twin = axis_mask(b.bytes.data(), lane, step, origin, axis);
-                    ASSERT_EQ(twin.ahead, mask.ahead >> lane & 1) << name << ' ' << n << ' ' << axis;
-                    ASSERT_EQ(twin.behind, mask.behind >> lane & 1) << name << ' ' << n << ' ' << axis;
+                    const AxisMask expected = axis_mask(b.bytes.data(), lane, step, origin, axis);
+                    ASSERT_EQ(expected.ahead, mask.ahead >> lane & 1) << name << ' ' << n << ' ' << axis;
+                    ASSERT_EQ(expected.behind, mask.behind >> lane & 1) << name << ' ' << n << ' ' << axis;
                 }
             }
             if (b.bytes[kBlockBoxExponent] > std::byte{kMaxBoxExponent}) continue; // open() refuses these
             const BoxRay boxes = box_ray(b.bytes.data(), ray);
             HWY_DYNAMIC_DISPATCH(block_box_entries)(b.bytes.data(), boxes, 0.75f, entries);
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const float twin = box_entry(b.bytes.data(), lane, boxes, 0.75f);
-                ASSERT_EQ(std::bit_cast<uint32_t>(twin), std::bit_cast<uint32_t>(entries[lane])) << name << ' ' << n;
+                const float expected = box_entry(b.bytes.data(), lane, boxes, 0.75f);
+                ASSERT_EQ(std::bit_cast<uint32_t>(expected), std::bit_cast<uint32_t>(entries[lane]))
+                    << name << ' ' << n;
             }
             ++compared;
         }

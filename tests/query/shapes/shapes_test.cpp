@@ -10,6 +10,7 @@
 #include "query/inside/inside.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/query/blocks.hpp"
+#include "tests/query/lane_references.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
@@ -301,10 +302,12 @@ TEST(ShapeLanes, SameBitsOnEveryTargetAndInPlainCode) {
                 return std::bit_cast<uint32_t>(x) == std::bit_cast<uint32_t>(y) || (std::isnan(x) && std::isnan(y));
             };
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const ShapeGap twin = shape_gap(block.bytes.data(), lane, step, lanes);
-                ASSERT_TRUE(same(twin.gap, gaps[lane].gap) && same(twin.key, gaps[lane].key)) << name << ' ' << k;
-                const ShapeGap plane_twin = shape_gap(block.bytes.data(), lane, step, plane);
-                ASSERT_TRUE(same(plane_twin.gap, plane_gaps[lane].gap) && same(plane_twin.key, plane_gaps[lane].key))
+                const ShapeGap expected = shape_gap(block.bytes.data(), lane, step, lanes);
+                ASSERT_TRUE(same(expected.gap, gaps[lane].gap) && same(expected.key, gaps[lane].key))
+                    << name << ' ' << k;
+                const ShapeGap plane_expected = shape_gap(block.bytes.data(), lane, step, plane);
+                ASSERT_TRUE(same(plane_expected.gap, plane_gaps[lane].gap) &&
+                            same(plane_expected.key, plane_gaps[lane].key))
                     << name << ' ' << k;
             }
         }
