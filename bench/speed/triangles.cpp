@@ -108,7 +108,7 @@ void leaves_scalar(benchmark::State& state, uint32_t count, double gap) {
             const auto b = query::place(s.b, j, s.b_to_a);
             for (uint32_t i = 0; i < count; ++i) {
                 ++out.pair_tests, ++out.exact_tests;
-                if (query::apart(query::place(s.a, i), b)) continue;
+                if (query::separated(query::place(s.a, i), b)) continue;
                 out.meet = true, out.triangle_a = i, out.triangle_b = j;
                 return out;
             }

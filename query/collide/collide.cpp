@@ -1,9 +1,8 @@
-// collide(): the query around the descent (descent.cpp). Bodies are taken in a fixed order, most pairs of a scene are
-// told apart by spheres around their roots, and a PairCache answers for bodies that have moved little.
+// collide() and collide_all(): the query around the traversal (search.cpp). Bodies are taken in their canonical order,
+// a bounding-sphere test of the roots answers for most pairs of a scene, and a PairCache for bodies that have moved
+// little.
 #include "query/collide/search.hpp"
 #include "query/inside/enclosure.hpp"
-#include "query/node/limits.hpp"
-#include "query/node/order.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -11,20 +10,16 @@
 #include <cmath>
 
 namespace prolate {
+
+Verdict query::decide(CollideSearch& search) noexcept {
+    Verdict verdict = traverse(search);
+    if (search.found > 0) verdict = Verdict::overlapping;
+    search.stats.deepest_level = std::max(search.a.deepest_level(), search.b.deepest_level());
+    if (verdict != Verdict::separated || !search.roots_meet) return verdict;
+    return look_inside(search.a.tree, search.b.tree, search.b_to_a, search.stats, search.options.max_pair_tests);
+}
+
 namespace {
-
-// The whole query with the bodies in their fixed order.
-Verdict run(query::Descent& d) {
-    Verdict verdict = query::descend(d);
-    if (d.found > 0) verdict = Verdict::overlapping;
-    d.stats.deepest_level = std::max(d.a.deepest_level(), d.b.deepest_level());
-    if (verdict != Verdict::separated || !d.roots_meet) return verdict;
-    return query::look_inside(d.a.tree, d.b.tree, d.b_to_a, d.stats, d.options.max_pair_tests);
-}
-
-MeetingPair exchanged(const MeetingPair& pair) {
-    return {pair.node_b, pair.node_a, pair.triangle_b, pair.triangle_a};
-}
 
 // ---- coherence ----
 
@@ -75,53 +70,64 @@ bool usable(const PairCache* cache, const TreeView& a, const TreeView& b, const 
 CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                              std::span<MeetingPair> pairs, QueryContext& context,
                              const QueryOptions& options) noexcept {
-    const bool swap = query::must_swap(a, pose_a, b, pose_b);
-    query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
-                                  : query::Descent(a, pose_a, b, pose_b, context, options);
-    descent.all = true;
-    descent.pairs = pairs;
-    const Verdict verdict = run(descent);
-    if (swap)
-        for (MeetingPair& pair : pairs.first(static_cast<size_t>(std::min<uint64_t>(descent.found, pairs.size()))))
-            pair = exchanged(pair);
-    return {verdict, verdict == Verdict::overlapping && descent.found == 0, descent.found, descent.stats};
+    const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
+    query::CollideSearch search(bodies, context, options);
+    search.all = true;
+    search.pairs = pairs;
+    const Verdict verdict = query::decide(search);
+    if (bodies.exchanged)
+        for (MeetingPair& pair : pairs.first(static_cast<size_t>(std::min<uint64_t>(search.found, pairs.size()))))
+            pair = query::exchanged(pair);
+    return {.verdict = verdict,
+            .enclosed = verdict == Verdict::overlapping && search.found == 0,
+            .found = search.found,
+            .stats = search.stats};
 }
 
 CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                       QueryContext& context, const QueryOptions& query_options, PairCache* cache) noexcept {
     const QueryOptions options = query::sound(query_options);
     if (!usable(cache, a, b, options)) cache = nullptr;
+    const auto remember = [&](Verdict verdict, const MeetingPair& pair, double distance) {
+        *cache = {.verdict = verdict,
+                  .pair = pair,
+                  .distance = static_cast<float>(distance * kRoundDown),
+                  .pose_a = pose_a,
+                  .pose_b = pose_b};
+    };
     double moved = 0, smaller = 0;
     if (cache) {
         const query::PlacedEllipsoid root_a = query::place(a.bound(0)), root_b = query::place(b.bound(0));
         smaller = std::min(root_a.size, root_b.size);
         if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b.reach);
         if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)
-            return {Verdict::separated, false, {}, {}};
+            return {.verdict = Verdict::separated, .pair = {}, .stats = {}};
     }
 
-    const bool swap = query::must_swap(a, pose_a, b, pose_b);
-    const TreeView &first = swap ? b : a, &second = swap ? a : b;
-    const query::RelativePose to_first =
-        swap ? query::relative_pose(pose_b, pose_a) : query::relative_pose(pose_a, pose_b);
-    const double gap = gap_of_spheres(first, second, to_first); // most pairs of a scene, at a fifth of the cost
+    const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
+    const query::RelativePose b_to_a = query::relative_pose(bodies.place_a, bodies.place_b);
+    const double gap =
+        gap_of_spheres(bodies.a, bodies.b, b_to_a); // settles most pairs of a scene, at a fifth of the cost
     if (gap > options.margin && options.max_pair_tests > 0) {
-        if (cache) *cache = {Verdict::separated, {}, static_cast<float>(gap * kRoundDown), pose_a, pose_b};
-        return {Verdict::separated, false, {}, {.pair_tests = 1}};
+        if (cache) remember(Verdict::separated, {}, gap);
+        return {.verdict = Verdict::separated, .pair = {}, .stats = {.pair_tests = 1}};
     }
-    query::Descent descent(first, second, to_first, context, options);
+    query::CollideSearch search(bodies.a, bodies.b, b_to_a, context, options);
     MeetingPair pair;
-    descent.pairs = {&pair, 1};
+    search.pairs = {&pair, 1};
     const auto answer = [&](Verdict verdict) {
-        if (swap) pair = exchanged(pair);
-        return CollideResult{verdict, verdict == Verdict::overlapping && descent.found == 0, pair, descent.stats};
+        if (bodies.exchanged) pair = query::exchanged(pair);
+        return CollideResult{.verdict = verdict,
+                             .enclosed = verdict == Verdict::overlapping && search.found == 0,
+                             .pair = pair,
+                             .stats = search.stats};
     };
-    if (!cache) return answer(run(descent));
+    if (!cache) return answer(query::decide(search));
 
     if (cache->verdict == Verdict::overlapping && names_leaves(cache->pair, a, b)) {
-        const MeetingPair last = swap ? exchanged(cache->pair) : cache->pair;
-        if (descent.meets(last)) {
-            descent.take(last);
+        const MeetingPair last = bodies.exchanged ? query::exchanged(cache->pair) : cache->pair;
+        if (search.meets(last)) {
+            search.take(last);
             cache->pose_a = pose_a, cache->pose_b = pose_b;
             return answer(Verdict::overlapping);
         }
@@ -129,10 +135,9 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     const double skin = cache->verdict == Verdict::undecided
                             ? kFirstSkin * smaller
                             : std::clamp(kSkinSteps * moved, kThinnestSkin * smaller, kThickestSkin * smaller);
-    descent.set_skin(static_cast<float>(skin));
-    const CollideResult result = answer(run(descent));
-    const double distance = double{options.margin} + descent.skin;
-    *cache = {result.verdict, result.pair, static_cast<float>(distance * kRoundDown), pose_a, pose_b};
+    search.set_skin(static_cast<float>(skin));
+    const CollideResult result = answer(query::decide(search));
+    remember(result.verdict, result.pair, double{options.margin} + search.skin);
     return result;
 }
 

@@ -1,11 +1,10 @@
-// What the descent's float tests leave open is decided here, in double precision.
+// What the traversal's float tests leave open is decided here, in double precision.
 #include "query/triangle/leaves.hpp"
 #include "query/collide/search.hpp"
 #include "query/ellipsoid/gap.hpp"
-#include "query/node/limits.hpp"
-#include "query/triangle/ellipsoid.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
+#include "query/triangle/separation.hpp"
 #include "query/triangle/support.hpp"
-#include "query/triangle/triangle.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -17,53 +16,54 @@ constexpr float kLeastSkin = 0x1p-6f;
 
 } // namespace
 
-Descent::Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, QueryContext& context,
-                 const QueryOptions& query_options) noexcept
+CollideSearch::CollideSearch(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a,
+                             QueryContext& context, const QueryOptions& query_options) noexcept
     : a(tree_side(tree_a, query_options.max_level)), b(tree_side(tree_b, query_options.max_level)), b_to_a(pose_b_to_a),
       lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
       lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(query_options)),
       stack(context.entries) {}
 
-void Descent::set_skin(float distance) noexcept {
+void CollideSearch::set_skin(float distance) noexcept {
     skin = distance;
     least_skin_ = kLeastSkin * distance;
 }
 
-// `apart(d)`: are the leaves certainly farther apart than d? False if they are not even beyond the margin.
-template <class Apart> bool Descent::parted(Apart&& apart) noexcept {
+// Are two leaves farther apart than the margin? If so, shrinks the skin until they are beyond it, too.
+// `farther_than(d)`: are they certainly farther apart than d?
+template <class FartherThan> bool CollideSearch::separated_by_margin(FartherThan&& farther_than) noexcept {
     while (skin > 0) {
-        if (apart(options.margin + skin)) return true;
+        if (farther_than(options.margin + skin)) return true;
         skin = skin > least_skin_ ? skin / 4 : 0;
     }
-    return apart(options.margin);
+    return farther_than(options.margin);
 }
 
 // Counts tests of triangles that were done. False if the budget does not hold so many: they are as if not done, so
 // that a budget ends a query just where its count says.
-bool Descent::spend(uint64_t tests) noexcept {
+bool CollideSearch::spend(uint64_t tests) noexcept {
     const uint64_t rest = left();
     out_of_tests = out_of_tests || tests > rest;
     stats.triangle_tests += std::min(tests, rest);
     return !out_of_tests;
 }
 
-bool Descent::take(const MeetingPair& pair) noexcept {
+bool CollideSearch::take(const MeetingPair& pair) noexcept {
     if (each != nullptr) each(each_user, pair);
     if (found < pairs.size()) pairs[static_cast<size_t>(found)] = pair;
     ++found;
     return !all;
 }
 
-// Are the triangles farther apart than margin + skin, as seen along this direction?
-bool Descent::apart_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept {
-    if (corners_reach_ < 0) corners_reach_ = reach_of_corners(a.tree) + reach_of_corners(b.tree) + b_to_a.distance;
+// Are the triangles farther apart than margin + skin along this direction?
+bool CollideSearch::separated_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept {
+    if (triangle_reach_ < 0) triangle_reach_ = triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance;
     const glm::dvec3 n = normal / glm::length(normal);
-    const double room = glm::dot(n, b_to_a.translation) - support_of_corners(a.tree, in_a, n);
-    return room - support_of_corners(b.tree, in_b, -(n * b_to_a.rotation)) >
-           double{options.margin} + skin + kSeparationMargin * corners_reach_;
+    const double room = glm::dot(n, b_to_a.translation) - triangle_support(a.tree, in_a, n);
+    return room - triangle_support(b.tree, in_b, -(n * b_to_a.rotation)) >
+           double{options.margin} + skin + kSeparationMargin * triangle_reach_;
 }
 
-bool Descent::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept {
+bool CollideSearch::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept {
     const TriangleRange in_a = a.tree.triangles(node_a), in_b = b.tree.triangles(node_b);
     const auto single = [&](uint32_t triangle_a, uint32_t triangle_b) { // true to stop
         const MeetingPair pair{node_a, node_b, triangle_a, triangle_b};
@@ -80,13 +80,13 @@ bool Descent::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) n
             if (single(t, kNoTriangle)) return true;
         return false;
     }
-    if (normal != glm::dvec3(0) && apart_along(normal, in_a, in_b)) return !spend(1);
+    if (normal != glm::dvec3(0) && separated_along(normal, in_a, in_b)) return !spend(1);
     LeafResult first;
     const auto test = [&](TriangleRange some_a, TriangleRange some_b, float distance) {
         first = test_leaves(a.tree, some_a, b.tree, some_b, b_to_a, distance);
         return spend(first.pair_tests) && !first.meet;
     };
-    if (parted([&](float distance) { return test(in_a, in_b, distance); })) return false;
+    if (separated_by_margin([&](float distance) { return test(in_a, in_b, distance); })) return false;
     if (out_of_tests) return true;
     if (!all) return take({node_a, node_b, first.triangle_a, first.triangle_b});
     for (uint32_t t = in_b.first; t < in_b.first + in_b.count; ++t)
@@ -99,19 +99,21 @@ bool Descent::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) n
     return false;
 }
 
-bool Descent::meets(const MeetingPair& pair) noexcept {
+bool CollideSearch::meets(const MeetingPair& pair) noexcept {
     const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
     if ((in_a || in_b) && !spend(1)) return false;
-    return !parted([&](float distance) {
+    return !separated_by_margin([&](float distance) {
         if (in_a && in_b)
-            return apart(place(a.tree, pair.triangle_a), place(b.tree, pair.triangle_b, b_to_a), distance);
-        const auto triangle_apart = [distance](const PlacedTriangle& x, const PlacedEllipsoid& y) {
-            return distance == 0 ? apart(x, y) : query::distance(x, y).lower > distance;
+            return separated(place(a.tree, pair.triangle_a), place(b.tree, pair.triangle_b, b_to_a), distance);
+        const auto triangle_separated = [distance](const PlacedTriangle& x, const PlacedEllipsoid& y) {
+            return distance == 0 ? separated(x, y) : query::distance(x, y).lower > distance;
         };
-        if (in_a) return triangle_apart(place(a.tree, pair.triangle_a), place(b.tree.ellipsoid(pair.node_b), b_to_a));
-        if (in_b) return triangle_apart(place(b.tree, pair.triangle_b, b_to_a), place(a.tree.ellipsoid(pair.node_a)));
+        if (in_a)
+            return triangle_separated(place(a.tree, pair.triangle_a), place(b.tree.ellipsoid(pair.node_b), b_to_a));
+        if (in_b)
+            return triangle_separated(place(b.tree, pair.triangle_b, b_to_a), place(a.tree.ellipsoid(pair.node_a)));
         const auto x = place(a.tree.ellipsoid(pair.node_a)), y = place(b.tree.ellipsoid(pair.node_b), b_to_a);
-        return apart(x, y, distance);
+        return separated(x, y, distance);
     });
 }
 

@@ -1,17 +1,17 @@
-// Tree against tree: simultaneous descent, a block of eight children at a time.
+// Tree against tree: both are descended at once, a block of eight children at a time.
 //
 // Of a pair of nodes that meet, the larger is opened: its children, up to eight of them in a block, are tested at once
-// against the other (lanes-inl.hpp), and those that are not separated from it make new pairs. Of exact trees, those
-// that nearly were are looked at more closely along the direction that nearly parted them: hulls of what is below the
-// nodes (hull_lanes-inl.hpp), or the triangles of two leaves (corners.hpp). Two leaves are decided at once, in double
-// precision (leaves.cpp). Which node is opened depends on the pair alone, so max_level and budgets only cut the descent
-// off: if level l says separated, so does every deeper one.
+// against the other (query/node/lanes-inl.hpp), and those that are not separated from it make new pairs. Of exact
+// trees, those that nearly are get a closer look along the direction that nearly separates them: hulls of what is below
+// the nodes (query/node/hull_lanes-inl.hpp), or the triangles of two leaves (query/triangle/support.hpp). Two leaves
+// are decided at once, in double precision (leaves.cpp). Which node is opened depends on the pair alone, so max_level
+// and budgets only cut the traversal off: if level l says separated, so does every deeper one.
 //
-// Sound because a node's bounding volume holds all leaves below it: if B is apart from A's child i, no leaf under B
+// Sound because a node's bounding volume holds all leaves below it: if B is separated from A's child i, no leaf of B
 // meets one under that child.
 //
-// Depth first, and of the children that meet, that with the deepest overlap first: bodies that touch are found out
-// soon, and for bodies that do not the order makes no difference.
+// Depth first, and of the children that meet, the deepest overlap first: bodies that touch are found out soon, and for
+// bodies that do not the order makes no difference.
 //
 // Complexity: one block test for each pair of nodes that meet, unless both are leaves.
 #undef HWY_TARGET_INCLUDE
@@ -22,6 +22,7 @@
 
 #include "query/collide/search.hpp"
 #include "query/node/hull_lanes-inl.hpp"
+#include "query/node/side-inl.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -35,78 +36,52 @@ namespace {
 // QueryContext::Entry::flags: which of the two nodes is to be opened, and whether the other is a leaf.
 constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2;
 
-// Nodes whose n.r / (a + b) is greater may well be apart along n as their hulls, or triangles, see it: below, a closer
+// Nodes of which p / (a + b) is greater may well be separated along n by their hulls, or triangles; below, a closer
 // look costs more than it saves.
-constexpr float kNearlyParted = 0.88f, kLeavesNearlyParted = 0.75f;
+constexpr float kNearlySeparated = 0.88f, kLeavesNearlySeparated = 0.75f;
 
-template <bool kMargin> class Search {
+template <bool kMargin> class CollideTraversal {
+    using Side = HWY_NAMESPACE::Side<PlacedNode>;
+
 public:
-    explicit Search(Descent& descent)
-        : d_(descent),
-          stack_(descent.stack), sides_{{descent.a, descent.lattice_b_to_a}, {descent.b, descent.lattice_a_to_b}} {}
+    explicit CollideTraversal(CollideSearch& search)
+        : s_(search),
+          stack_(search.stack), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}} {}
 
     Verdict run() {
-        const Verdict verdict = search();
-        d_.stats.pair_tests = pair_tests_, d_.stats.block_tests = block_tests_;
-        d_.a.deepest = sides_[0].deepest, d_.b.deepest = sides_[1].deepest;
+        const Verdict verdict = descend();
+        s_.stats.pair_tests = pair_tests_, s_.stats.block_tests = block_tests_;
+        s_.a.deepest = sides_[0].deepest, s_.b.deepest = sides_[1].deepest;
         return verdict;
     }
 
 private:
-    // Nodes that were placed before: every third or so is tested against another block soon.
-    static constexpr uint32_t kPlaced = 8;
-    struct Placed {
-        uint32_t node = UINT32_MAX;
-        Single single;
-    };
-    // One of the bodies, as that whose children are tested.
-    struct Side {
-        Side(const TreeSide& body, const LatticePose& other_to_here)
-            : blocks(body.tree.block(0)), bounding_blocks(body.tree.bounding_block(0)),
-              hulls(body.tree.has_triangles() ? body.tree.hull(0) : nullptr), step_exponent(body.lattice.step_exponent),
-              leaves_from(body.leaves_from), limit_from(body.limit_from), pose(other_to_here),
-              per_step(power_of_two(-step_exponent)) {}
-        // As queries take it: bounding blocks above the last level.
-        const std::byte* block(uint32_t slot) const {
-            return (slot < leaves_from ? bounding_blocks : blocks) + size_t{slot / kBlockLanes} * kBlockBytes;
-        }
-
-        const std::byte *blocks, *bounding_blocks;
-        const std::byte* hulls;
-        int32_t step_exponent;
-        uint32_t leaves_from, limit_from, deepest = 0;
-        const LatticePose& pose;
-        double per_step;
-        Placed placed[kPlaced]; // of the other body's nodes
-    };
-
-    Verdict search() {
+    Verdict descend() {
         // The roots, as if B's were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         pair_tests_ = 1;
-        if (test_all(kOpenB, 0, 1, 0, d_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
+        if (test_all(kOpenB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
         while (size_ > 0) {
             const auto e = stack_[--size_];
             const uint32_t open = e.flags & kOpenB;
             const uint32_t node = open != 0 ? e.node_b : e.node_a, other = open != 0 ? e.node_a : e.node_b;
             const Side& side = sides_[open];
-            if (node >= side.limit_from) { // max_level ends the descent
-                if (d_.take({e.node_a, e.node_b, kNoTriangle, kNoTriangle})) return Verdict::overlapping;
+            if (node >= side.limit_from) { // max_level ends the traversal
+                if (s_.take({e.node_a, e.node_b, kNoTriangle, kNoTriangle})) return Verdict::overlapping;
                 continue;
             }
-            const std::byte* const block = side.block(node);
-            const uint32_t lane = node % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
-            const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
-            if (count > budget()) return Verdict::undecided;
-            pair_tests_ += count; // also those that it may not come to
-            if (count <= kBlockLanes ? test(open, first, count, other, e.flags & kOtherIsLeaf)
-                                     : test_all(open, first, count, other, e.flags & kOtherIsLeaf))
+            const ChildRange children = children_in(side.block(node), node % kBlockLanes);
+            if (children.count > budget()) return Verdict::undecided;
+            pair_tests_ += children.count; // also those that it may not come to
+            if (children.count <= kBlockLanes
+                    ? test(open, children.first, children.count, other, e.flags & kOtherIsLeaf)
+                    : test_all(open, children, other, e.flags & kOtherIsLeaf))
                 return stopped();
         }
         return Verdict::separated;
     }
 
-    // What is known of the lanes that were not parted.
+    // What is known of the lanes that were not separated.
     struct Kept {
         alignas(64) float depth[kBlockLanes]; // p / (a + b)
         alignas(64) float n[3][kBlockLanes];
@@ -124,8 +99,8 @@ private:
         }
     };
 
-    // Do the hulls of a lane's node and the other tree's leave a gap along n?
-    HWY_NOINLINE bool hulls_part(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
+    // Are the hulls of a lane's node and of the other tree's node separated along n?
+    HWY_NOINLINE bool hulls_separated(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
         const auto reach = [](const Side& side, uint32_t slot, float x, float y, float z, float width) {
             const std::byte* const block = side.block(slot);
             const uint32_t at = slot % kBlockLanes;
@@ -140,11 +115,11 @@ private:
         return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
     }
 
-    Verdict stopped() const { return d_.out_of_tests ? Verdict::undecided : Verdict::overlapping; }
+    Verdict stopped() const { return s_.out_of_tests ? Verdict::undecided : Verdict::overlapping; }
 
-    uint64_t budget() const { // d_.stats has the triangles' tests, and the nodes' later
-        const uint64_t left = d_.left();
-        return left - std::min(left, pair_tests_ - d_.stats.pair_tests);
+    uint64_t budget() const { // s_.stats has the triangles' tests, and the nodes' later
+        const uint64_t left = s_.left();
+        return left - std::min(left, pair_tests_ - s_.stats.pair_tests);
     }
 
     // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
@@ -154,12 +129,7 @@ private:
         const std::byte* const block = side.block(first);
         ++block_tests_;
         side.deepest = std::max(side.deepest, first + count - 1);
-        Placed& placed = side.placed[other % kPlaced];
-        if (placed.node != other) {
-            placed.single = place_here(sides_[open ^ kOpenB].block(other), other % kBlockLanes, side.pose);
-            placed.node = other;
-        }
-        const Single& single = placed.single;
+        const Single& single = side.place(sides_[open ^ kOpenB], other).single;
         const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
         uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
         if (meet == 0) return false;
@@ -167,15 +137,15 @@ private:
         Kept kept;
         const Float margin = set(lattice_margin);
         for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
-            const LaneTerms t = evaluate(load_nodes(block, i, side.step_exponent), single);
+            const LaneTerms t = evaluate(load_nodes(block, i, side.lattice.step_exponent), single);
             met |= bits(!separated<kMargin>(t, margin)) << i;
             larger |= bits(t.size > single.size) << i;
             kept.keep(t, margin, i);
         }
         meet &= met;
         if (meet == 0) return false;
-        d_.roots_meet = true;
-        const uint32_t leaves = first >= side.leaves_from ? 0xff : leaf_lanes(block);
+        s_.roots_meet = true;
+        const uint32_t leaves = side.leaf_lanes(first, block);
         if (other_is_leaf != 0 && (meet & leaves) != 0) {
             if (decide(open, first, meet & leaves, other, kept)) return true;
             meet &= ~leaves;
@@ -187,7 +157,8 @@ private:
         for (; meet != 0; meet &= meet - 1) {
             const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
             const uint32_t node = first + lane;
-            if (have_hulls_ && kept.depth[lane] > kNearlyParted && hulls_part(open, node, other, kept, lane)) continue;
+            if (have_hulls_ && kept.depth[lane] > kNearlySeparated && hulls_separated(open, node, other, kept, lane))
+                continue;
             const uint32_t flags =
                 (opened >> lane & 1) != 0 ? if_opened : if_other_opened | (leaves >> lane & 1) * kOtherIsLeaf;
             if (kept.depth[lane] < least) least = kept.depth[lane], deepest = size_;
@@ -199,7 +170,7 @@ private:
 
     // Decides on these lanes, the deepest first, against the other tree's leaf. True to stop the query.
     HWY_NOINLINE bool decide(uint32_t open, uint32_t first, uint32_t lanes, uint32_t other, const Kept& kept) {
-        d_.stats.pair_tests = pair_tests_;
+        s_.stats.pair_tests = pair_tests_;
         while (lanes != 0) {
             auto lane = static_cast<uint32_t>(std::countr_zero(lanes));
             for (uint32_t rest = lanes & (lanes - 1); rest != 0; rest &= rest - 1) {
@@ -207,52 +178,43 @@ private:
                 if (kept.depth[next] < kept.depth[lane]) lane = next;
             }
             lanes &= ~(1u << lane);
-            const bool look = kept.depth[lane] > kLeavesNearlyParted;
+            const bool look = kept.depth[lane] > kLeavesNearlySeparated;
             const glm::dvec3 to_lane =
                 look ? glm::dvec3(kept.n[0][lane], kept.n[1][lane], kept.n[2][lane]) : glm::dvec3(0); // in its frame
-            if (open != 0 ? d_.meet(other, first + lane, d_.b_to_a.rotation * to_lane)
-                          : d_.meet(first + lane, other, -to_lane))
+            if (open != 0 ? s_.meet(other, first + lane, s_.b_to_a.rotation * to_lane)
+                          : s_.meet(first + lane, other, -to_lane))
                 return true;
         }
         return false;
     }
 
     // Some or all children, where that is rare: in a loop with the usual case this would cost it registers.
-    HWY_NOINLINE bool test_all(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
-        for (uint32_t i = 0; i < count; i += kBlockLanes)
-            if (test(open, first + i, std::min(count - i, kBlockLanes), other, other_is_leaf)) return true;
-        return false;
-    }
-
-    // Bit i: lane i, if there is such a node, has no children: its count is 0, or one of triangles.
-    static uint32_t leaf_lanes(const std::byte* block) {
-        static_assert(kTriangleLeaf == 0x80);
-        constexpr uint64_t kTop = 0x8080808080808080;
-        const auto counts = load_le<uint64_t>(block + kBlockCount);
-        const uint64_t some = (counts & ~kTop) + ~kTop; // top bit of a byte: its lower bits are not all zero
-        const uint64_t leaves = (counts | ~some) & kTop;
-        return static_cast<uint32_t>((leaves >> 7) * 0x0102040810204080 >> 56); // gathers one bit of each byte
+    HWY_NOINLINE bool test_all(uint32_t open, ChildRange children, uint32_t other, uint32_t other_is_leaf) {
+        return !for_each_block(
+            children, [&](uint32_t first, uint32_t count) { return !test(open, first, count, other, other_is_leaf); });
     }
 
     // options.margin + skin in lattice steps, rounded up.
     float margin_in(const Side& side) const {
-        return static_cast<float>((double{d_.options.margin} + d_.skin) * kRoundUp * side.per_step);
+        return static_cast<float>((double{s_.options.margin} + s_.skin) * kRoundUp *
+                                  power_of_two(-side.lattice.step_exponent));
     }
     static constexpr double kRoundUp = 1 + 0x1p-20; // also pays for the rounding of margin |n|
 
     // Opening a node takes one entry off and puts at most kMaxDegree on, and no pair lies deeper than both trees
     // together.
     static_assert(QueryContext::kEntries > 2 * (kMaxLevels - 1) * (kMaxDegree - 1) + 1);
-    Descent& d_;
+    CollideSearch& s_;
     QueryContext::Entry* const stack_;
     uint32_t size_ = 0;
     uint64_t pair_tests_ = 0, block_tests_ = 0;
-    const bool have_hulls_ = d_.a.tree.has_triangles() || d_.b.tree.has_triangles();
+    const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
     Side sides_[2];
 };
 
-Verdict descend_target(Descent& descent) {
-    return descent.options.margin + descent.skin > 0 ? Search<true>(descent).run() : Search<false>(descent).run();
+Verdict traverse_target(CollideSearch& search) {
+    return search.options.margin + search.skin > 0 ? CollideTraversal<true>(search).run()
+                                                   : CollideTraversal<false>(search).run();
 }
 
 } // namespace
@@ -261,9 +223,9 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace prolate::query {
-HWY_EXPORT(descend_target);
-Verdict descend(Descent& descent) noexcept {
-    return HWY_DYNAMIC_DISPATCH(descend_target)(descent);
+HWY_EXPORT(traverse_target);
+Verdict traverse(CollideSearch& search) noexcept {
+    return HWY_DYNAMIC_DISPATCH(traverse_target)(search);
 }
 } // namespace prolate::query
 #endif // HWY_ONCE

@@ -1,18 +1,19 @@
-// One collide() query: what the vectorised descent (collide.cpp) and the decisions at its leaves (leaves.cpp) share.
+// One collide() query: what the vectorised traversal (search.cpp) and the decisions at its leaves (leaves.cpp) share.
 #pragma once
 
 #include "query/node/lattice.hpp"
+#include "query/node/limits.hpp"
+#include "query/node/order.hpp"
 #include "query/node/tree_side.hpp"
 
 #include <prolate/collide.hpp>
 
-#include <algorithm>
 #include <cstdint>
 #include <span>
 
 namespace prolate::query {
 
-struct Descent {
+struct CollideSearch {
     TreeSide a, b;
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
@@ -28,20 +29,19 @@ struct Descent {
     uint64_t other_tests = 0;  ///< that `each` did, of the same budget
     bool out_of_tests = false; ///< the budget ran out within a leaf
 
-    /// Nodes are parted only if they are farther apart than options.margin + skin, metres. Leaves that are nearer, but
-    /// beyond options.margin, shrink the skin to what they leave; so if the bodies turn out to be separated, they are
-    /// farther apart than margin + skin.
+    /// Nodes count as separated only if they are farther apart than options.margin + skin, metres. Leaves that are
+    /// nearer, but beyond options.margin, shrink the skin to what they leave; so if the bodies turn out to be
+    /// separated, they are farther apart than margin + skin.
     float skin = 0;
     bool roots_meet = false;
 
-    Descent(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, QueryContext& context,
-            const QueryOptions& query_options) noexcept;
-    Descent(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
-            QueryContext& context, const QueryOptions& query_options) noexcept
-        : Descent(tree_a, tree_b, relative_pose(pose_a, pose_b), context, query_options) {}
+    CollideSearch(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a,
+                  QueryContext& context, const QueryOptions& query_options) noexcept;
+    CollideSearch(const OrderedBodies<Pose>& bodies, QueryContext& context, const QueryOptions& query_options) noexcept
+        : CollideSearch(bodies.a, bodies.b, relative_pose(bodies.place_a, bodies.place_b), context, query_options) {}
 
     /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query. `normal` is 0, or
-    /// of any length, in A's frame, from A to B, and along it they may well be apart.
+    /// of any length, in A's frame, from A to B, and along it they may well be separated.
     bool meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept;
     /// Takes a pair that meets. True to stop the query.
     bool take(const MeetingPair& pair) noexcept;
@@ -50,23 +50,23 @@ struct Descent {
     bool meets(const MeetingPair& pair) noexcept;
 
     /// Tests left of the budget.
-    uint64_t left() const noexcept {
-        const uint64_t used = stats.tests() + other_tests;
-        return options.max_pair_tests - std::min(used, options.max_pair_tests);
-    }
+    uint64_t left() const noexcept { return tests_left(options.max_pair_tests, stats.tests() + other_tests); }
 
     /// Starts with this skin.
     void set_skin(float distance) noexcept;
 
 private:
     bool spend(uint64_t tests) noexcept;
-    template <class Apart> bool parted(Apart&& apart) noexcept;
-    bool apart_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept;
+    template <class FartherThan> bool separated_by_margin(FartherThan&& farther_than) noexcept;
+    bool separated_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept;
     float least_skin_ = 0;
-    double corners_reach_ = -1; // S of corners.hpp, once it is asked for
+    double triangle_reach_ = -1; // S of query/triangle/support.hpp, once it is asked for
 };
 
-/// The descent itself: separated, overlapping (surfaces or leaves), or undecided (out of budget).
-Verdict descend(Descent& descent) noexcept;
+/// The traversal alone: separated, overlapping (what max_level lets stand for leaves), or undecided (out of budget).
+/// Leaves that meet are counted in `found`.
+Verdict traverse(CollideSearch& search) noexcept;
+/// The whole question: do surfaces meet, or else does one solid hold a part of the other? Completes `stats`.
+Verdict decide(CollideSearch& search) noexcept;
 
 } // namespace prolate::query

@@ -14,11 +14,9 @@
 #include "query/contacts/manifold.hpp"
 #include "query/ellipsoid/convert.hpp"
 #include "query/ellipsoid/gap.hpp"
-#include "query/inside/enclosure.hpp"
-#include "query/node/order.hpp"
 #include "query/triangle/climb.hpp"
 #include "query/triangle/contact.hpp"
-#include "query/triangle/ellipsoid.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
 
 #include <prolate/contacts.hpp>
 #include <prolate/raycast.hpp>
@@ -89,21 +87,20 @@ dvec3 perpendicular(const dvec3& n) {
 
 class Collector {
 public:
-    Collector(Descent& descent, QueryContext& context, bool swapped, const ContactManifolds& last,
+    Collector(CollideSearch& search, QueryContext& context, bool swapped, const ContactManifolds& last,
               const RelativePose& to_world)
-        : d_(descent), context_(context), swapped_(swapped), last_(last), closed_a_(closed(descent.a.tree)),
-          closed_b_(closed(descent.b.tree)),
-          hills_a_(descent.a.tree, descent.other_tests, descent.options.max_pair_tests),
-          hills_b_(descent.b.tree, descent.other_tests, descent.options.max_pair_tests),
-          size_(std::min(place(d_.a.tree.root()).size, place(d_.b.tree.root()).size)), patches_(kSamePoint * size_) {
+        : s_(search), context_(context), swapped_(swapped), last_(last), closed_a_(closed(search.a.tree)),
+          closed_b_(closed(search.b.tree)), hills_a_(search.a.tree, search.other_tests, search.options.max_pair_tests),
+          hills_b_(search.b.tree, search.other_tests, search.options.max_pair_tests),
+          size_(std::min(place(s_.a.tree.root()).size, place(s_.b.tree.root()).size)), patches_(kSamePoint * size_) {
         for (uint32_t i = 0; i < std::min(last.count, kManifolds); ++i) {
             const Vec3& n = last.manifolds[i].normal;
             const dvec3 here = dvec3(n.x, n.y, n.z) * to_world.rotation; // the transpose times it
             last_normals_[i] = swapped ? -here : here;
             patches_.expect(last_normals_[i]);
         }
-        descent.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
-        descent.each_user = this;
+        search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
+        search.each_user = this;
     }
     // Between the two passes: settles the normals and depths.
     void settle() {
@@ -147,7 +144,7 @@ public:
         uint32_t count = 0;
         for (uint32_t i = 0; i < ways_; ++i)
             if (!points_[i].empty()) out[count++] = &points_[i];
-        if (count > 0 || d_.found == 0) return count;
+        if (count > 0 || s_.found == 0) return count;
         const Contact c = last_resort();
         points_[0] = Patch(c.normal);
         points_[0].add(c.normal, candidate(c), 0, c.overlap, patches_.apart());
@@ -165,7 +162,7 @@ private:
 
     void add(const MeetingPair& pair) {
         if (!settled_) {
-            if (d_.found == 0) first_ = pair;
+            if (s_.found == 0) first_ = pair;
             KnownOverlap known;
             patches_.for_each([&](const Patch& p) {
                 if (p.overlap() < known.overlap && resolves(p.normal(), p.overlap(), pair))
@@ -197,18 +194,18 @@ private:
         return high - low <= depth + patches_.apart();
     }
 
-    PlacedTriangle triangle_a(const MeetingPair& pair) const { return place(d_.a.tree, pair.triangle_a); }
-    PlacedTriangle triangle_b(const MeetingPair& pair) const { return place(d_.b.tree, pair.triangle_b, d_.b_to_a); }
-    PlacedEllipsoid ellipsoid_a(const MeetingPair& pair) const { return place(d_.a.tree.ellipsoid(pair.node_a)); }
+    PlacedTriangle triangle_a(const MeetingPair& pair) const { return place(s_.a.tree, pair.triangle_a); }
+    PlacedTriangle triangle_b(const MeetingPair& pair) const { return place(s_.b.tree, pair.triangle_b, s_.b_to_a); }
+    PlacedEllipsoid ellipsoid_a(const MeetingPair& pair) const { return place(s_.a.tree.ellipsoid(pair.node_a)); }
     PlacedEllipsoid ellipsoid_b(const MeetingPair& pair) const {
-        return place(d_.b.tree.ellipsoid(pair.node_b), d_.b_to_a);
+        return place(s_.b.tree.ellipsoid(pair.node_b), s_.b_to_a);
     }
     Surrounded surrounded_a(uint32_t triangle) const {
-        return {place(d_.a.tree, triangle), closed_a_, &hills_a_, d_.a.tree.triangle(triangle)};
+        return {place(s_.a.tree, triangle), closed_a_, &hills_a_, s_.a.tree.triangle(triangle)};
     }
     Surrounded surrounded_b(uint32_t triangle) const {
-        return {place(d_.b.tree, triangle, d_.b_to_a), closed_b_, &hills_b_, d_.b.tree.triangle(triangle),
-                &d_.b_to_a.rotation};
+        return {place(s_.b.tree, triangle, s_.b_to_a), closed_b_, &hills_b_, s_.b.tree.triangle(triangle),
+                &s_.b_to_a.rotation};
     }
     static Part whole(uint32_t node, uint32_t triangle) {
         return triangle != kNoTriangle ? Part{Part::Kind::triangle, triangle} : Part{Part::Kind::node, node};
@@ -225,7 +222,7 @@ private:
     bool along(const dvec3& n, const MeetingPair& pair, Patch& patch) const {
         const auto put = [&](const Contact& c) { patch.add(n, candidate(c), 0, c.overlap, patches_.apart()); };
         if (pair.triangle_a != kNoTriangle && pair.triangle_b != kNoTriangle) {
-            const TriangleContact found = contact_along(n, triangle_a(pair), triangle_b(pair), d_.options.margin);
+            const TriangleContact found = contact_along(n, triangle_a(pair), triangle_b(pair), s_.options.margin);
             for_each_point(found, pair, put);
             return found.faces;
         }
@@ -241,7 +238,7 @@ private:
         const dvec3 below = lowest + depth * up;
         for (size_t i = 0; i < 3; ++i) // what lies beside the triangle is its neighbours'
             if (glm::dot(face, glm::cross(t.corner[(i + 1) % 3] - t.corner[i], below - t.corner[i])) < 0) return true;
-        if (depth >= -d_.options.margin)
+        if (depth >= -s_.options.margin)
             put({pair, n, 0.5 * (lowest + below), depth, whole(pair.node_a, pair.triangle_a),
                  whole(pair.node_b, pair.triangle_b), depth});
         return true;
@@ -253,8 +250,8 @@ private:
             const auto part = [beside](const TreeView& tree, uint32_t triangle, Feature feature) {
                 return beside ? whole(0, triangle) : part_of(tree, triangle, feature);
             };
-            put(Contact{pair, found.normal, 0.5 * (p.on_a + p.on_b), p.depth, part(d_.a.tree, pair.triangle_a, p.of_a),
-                        part(d_.b.tree, pair.triangle_b, p.of_b), found.overlap});
+            put(Contact{pair, found.normal, 0.5 * (p.on_a + p.on_b), p.depth, part(s_.a.tree, pair.triangle_a, p.of_a),
+                        part(s_.b.tree, pair.triangle_b, p.of_b), found.overlap});
         }
     }
 
@@ -264,7 +261,7 @@ private:
         const bool in_a = pair.triangle_a != kNoTriangle, in_b = pair.triangle_b != kNoTriangle;
         if (in_a && in_b) {
             const TriangleContact found =
-                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), d_.options.margin, known);
+                contact(surrounded_a(pair.triangle_a), surrounded_b(pair.triangle_b), s_.options.margin, known);
             return for_each_point(found, pair, [&](const Contact& c) { use(c, found.faces); });
         }
         if (in_a) return own_mixed(pair, surrounded_a(pair.triangle_a), ellipsoid_b(pair), 1, use);
@@ -323,9 +320,9 @@ private:
     // is above `enough` may be too little.
     double overlap(const dvec3& n, uint32_t& vertex_a, uint32_t& vertex_b, double enough) const {
         Climb a{&hills_a_, n, vertex_a, vertex_a, kClimbSteps},
-            b{&hills_b_, -(n * d_.b_to_a.rotation), vertex_b, vertex_b, kClimbSteps};
-        const dvec3 at_a = to_double(d_.a.tree.vertex(vertex_a)),
-                    at_b = d_.b_to_a.rotation * to_double(d_.b.tree.vertex(vertex_b)) + d_.b_to_a.translation;
+            b{&hills_b_, -(n * s_.b_to_a.rotation), vertex_b, vertex_b, kClimbSteps};
+        const dvec3 at_a = to_double(s_.a.tree.vertex(vertex_a)),
+                    at_b = s_.b_to_a.rotation * to_double(s_.b.tree.vertex(vertex_b)) + s_.b_to_a.translation;
         double sum = glm::dot(n, at_a - at_b);
         while (sum <= enough && a.steps_left > 0) sum += a.step();
         while (sum <= enough && b.steps_left > 0) sum += b.step();
@@ -394,16 +391,16 @@ private:
     // A vertex of the one body that lies in the other, its place in A's frame.
     void add_deepest(const MeetingPair& pair, uint32_t vertex, const dvec3& n, double most, bool of_a, Patch& to) {
         const dvec3 up = of_a ? n : -n;
-        const dvec3 here = to_double((of_a ? d_.a : d_.b).tree.vertex(vertex));
-        const dvec3 at = of_a ? here : d_.b_to_a.rotation * here + d_.b_to_a.translation;
+        const dvec3 here = to_double((of_a ? s_.a : s_.b).tree.vertex(vertex));
+        const dvec3 at = of_a ? here : s_.b_to_a.rotation * here + s_.b_to_a.translation;
         // Cast in the other body's frame, against `up`.
-        const RelativePose a_to_b = inverse(d_.b_to_a);
+        const RelativePose a_to_b = inverse(s_.b_to_a);
         const dvec3 start = of_a ? a_to_b.rotation * at + a_to_b.translation : at;
         const dvec3 direction = of_a ? -(a_to_b.rotation * up) : -up;
-        const RaycastResult hit = raycast((of_a ? d_.b : d_.a).tree, Pose{},
+        const RaycastResult hit = raycast((of_a ? s_.b : s_.a).tree, Pose{},
                                           {to_float(start), to_float(direction), static_cast<float>(most) + 1},
-                                          context_, {.max_pair_tests = d_.left()});
-        d_.other_tests += hit.stats.pair_tests + hit.stats.triangle_tests;
+                                          context_, {.max_pair_tests = s_.left()});
+        s_.other_tests += hit.stats.pair_tests + hit.stats.triangle_tests;
         if (hit.triangle == kNoTriangle) return;
         MeetingPair found = pair;
         (of_a ? found.triangle_b : found.triangle_a) = hit.triangle;
@@ -449,7 +446,7 @@ private:
         return out;
     }
     void take(const Contact& c, bool with_normal) {
-        const double weight = with_normal ? std::max(0.0, c.depth + d_.options.margin) + kTolerance * size_ : 0;
+        const double weight = with_normal ? std::max(0.0, c.depth + s_.options.margin) + kTolerance * size_ : 0;
         patches_.add(c.normal, candidate(c), weight, with_normal ? c.overlap : -HUGE_VAL);
     }
     // What waits counts if no patch resolves it, or only one that is deeper than the pair.
@@ -466,7 +463,7 @@ private:
         waiting_count_ = 0;
     }
 
-    Descent& d_;
+    CollideSearch& s_;
     QueryContext& context_; // free between the passes
     const bool swapped_;
     const ContactManifolds& last_;
@@ -513,30 +510,25 @@ void match(Manifold& manifold, const ContactManifolds& last) {
 }
 
 // In the fixed order of bodies.
-ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactManifolds& manifolds,
+ContactResult run(CollideSearch& search, const Pose& pose_a, bool swapped, ContactManifolds& manifolds,
                   QueryContext& context) {
     const RelativePose to_world = relative_pose(Pose{}, pose_a);
     const ContactManifolds last = manifolds;
     manifolds = {};
-    Collector collector(descent, context, swapped, last, to_world);
-    descent.all = true;
+    Collector collector(search, context, swapped, last, to_world);
+    search.all = true;
     ContactResult out;
-    out.verdict = descend(descent);
-    if (descent.found > 0) out.verdict = Verdict::overlapping;
-    if (out.verdict == Verdict::separated && descent.roots_meet)
-        out.verdict =
-            look_inside(descent.a.tree, descent.b.tree, descent.b_to_a, descent.stats, descent.options.max_pair_tests);
-    out.enclosed = out.verdict == Verdict::overlapping && descent.found == 0;
-    out.found = descent.found;
-    descent.stats.deepest_level = std::max(descent.a.deepest_level(), descent.b.deepest_level());
-    out.stats = descent.stats;
-    out.stats.triangle_tests += descent.other_tests;
-    if (!std::isfinite(descent.b_to_a.distance)) return out; // no place for points
+    out.verdict = decide(search);
+    out.enclosed = out.verdict == Verdict::overlapping && search.found == 0;
+    out.found = search.found;
+    out.stats = search.stats;
+    out.stats.triangle_tests += search.other_tests;
+    if (!std::isfinite(search.b_to_a.distance)) return out; // no place for points
 
-    if (descent.found > 0) {
+    if (search.found > 0) {
         collector.settle();
-        descent.found = 0, descent.stats = {}, descent.other_tests = 0; // what they count is known
-        descend(descent);
+        search.found = 0, search.stats = {}, search.other_tests = 0; // what they count is known
+        traverse(search);
     }
     const Patch* patches[kManifolds];
     manifolds.count = collector.patches(patches);
@@ -560,10 +552,9 @@ ContactResult run(Descent& descent, const Pose& pose_a, bool swapped, ContactMan
 
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options) noexcept {
-    const bool swap = query::must_swap(a, pose_a, b, pose_b);
-    query::Descent descent = swap ? query::Descent(b, pose_b, a, pose_a, context, options)
-                                  : query::Descent(a, pose_a, b, pose_b, context, options);
-    return query::run(descent, swap ? pose_b : pose_a, swap, manifolds, context);
+    const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
+    query::CollideSearch search(bodies, context, options);
+    return query::run(search, bodies.place_a, bodies.exchanged, manifolds, context);
 }
 
 } // namespace prolate

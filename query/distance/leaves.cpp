@@ -1,9 +1,8 @@
-// What the float bounds of distance.cpp leave open is decided here, in double precision.
+// What the traversal's float bounds leave open is decided here, in double precision.
 #include "query/triangle/leaves.hpp"
 #include "query/distance/search.hpp"
 #include "query/ellipsoid/gap.hpp"
-#include "query/node/limits.hpp"
-#include "query/triangle/ellipsoid.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
 #include "query/triangle/support.hpp"
 
 #include <glm/geometric.hpp>
@@ -30,12 +29,12 @@ DistanceOptions sound(DistanceOptions options) {
 
 } // namespace
 
-DistanceSearch::DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
-                               QueryContext& context, const DistanceOptions& distance_options) noexcept
-    : a(tree_side(tree_a, distance_options.max_level)), b(tree_side(tree_b, distance_options.max_level)),
-      b_to_a(relative_pose(pose_a, pose_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
+DistanceSearch::DistanceSearch(const OrderedBodies<Pose>& bodies, QueryContext& context,
+                               const DistanceOptions& distance_options) noexcept
+    : a(tree_side(bodies.a, distance_options.max_level)), b(tree_side(bodies.b, distance_options.max_level)),
+      b_to_a(relative_pose(bodies.place_a, bodies.place_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
       lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(distance_options)),
-      entries(context.entries), corners_reach_(reach_of_corners(tree_a) + reach_of_corners(tree_b) + b_to_a.distance) {}
+      entries(context.entries), triangle_reach_(triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
     const PlacedEllipsoid x = place(search.a.tree.bound(0)), y = place(search.b.tree.bound(0), search.b_to_a);
@@ -67,7 +66,7 @@ bool DistanceSearch::decide(uint32_t node_a, uint32_t node_b, double bound) noex
     for (uint32_t t = range.first; t < range.first + range.count && !overlapping; ++t) {
         const PlacedTriangle triangle = triangles_in_a ? place(a.tree, t) : place(b.tree, t, b_to_a);
         TriangleDistance found = distance(triangle, ellipsoid);
-        const bool meet = !apart(triangle, ellipsoid);
+        const bool meet = !separated(triangle, ellipsoid);
         ++stats.triangle_tests;
         if (!triangles_in_a) std::swap(found.on_a, found.on_b);
         take(found, {node_a, node_b, triangles_in_a ? t : kNoTriangle, triangles_in_a ? kNoTriangle : t}, bound, meet);
@@ -77,7 +76,7 @@ bool DistanceSearch::decide(uint32_t node_a, uint32_t node_b, double bound) noex
 
 void DistanceSearch::decide_ellipsoids(uint32_t node_a, uint32_t node_b, double bound) noexcept {
     const PlacedEllipsoid x = place(a.tree.ellipsoid(node_a)), y = place(b.tree.ellipsoid(node_b), b_to_a);
-    const bool meet = !apart(x, y);
+    const bool meet = !separated(x, y);
     const double wanted = meet || !(upper < kInfinity) ? 0 : kOfTolerance * tolerance(upper);
     Gap gap = distance_of(x, y, wanted, normal);
     // If these are the nearest, what is wanted is a share of their own distance.
@@ -92,12 +91,12 @@ double DistanceSearch::gap_along_normal(uint32_t node_a, uint32_t node_b, Triang
                                         TriangleRange in_b) noexcept {
     const auto kept = [](Supports& supports, const TreeView& tree, uint32_t leaf, TriangleRange range, const dvec3& n) {
         Support& at = supports[leaf % supports.size()];
-        if (at.leaf != leaf) at = {leaf, support_of_corners(tree, range, n)};
+        if (at.leaf != leaf) at = {leaf, triangle_support(tree, range, n)};
         return at.reach;
     };
     const double gap = (glm::dot(normal, b_to_a.translation) - kept(supports_b_, b.tree, node_b, in_b, -normal_b)) -
                        kept(supports_a_, a.tree, node_a, in_a, normal);
-    return (gap - kSeparationMargin * corners_reach_) * (1 - 0x1p-50);
+    return (gap - kSeparationMargin * triangle_reach_) * (1 - 0x1p-50);
 }
 
 void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,

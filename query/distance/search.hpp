@@ -1,8 +1,10 @@
-// One distance() query: what the vectorised search (distance.cpp) and the decisions at its leaves (distance_leaves.cpp)
-// share. Everything in the frame of body A, in metres.
+// One distance() query: what the vectorised traversal (search.cpp) and the decisions at its leaves (leaves.cpp) share.
+// Everything in the frame of body A, in metres.
 #pragma once
 
 #include "query/node/lattice.hpp"
+#include "query/node/limits.hpp"
+#include "query/node/order.hpp"
 #include "query/node/tree_side.hpp"
 #include "query/triangle/distance.hpp"
 
@@ -40,10 +42,10 @@ struct DistanceSearch {
     glm::dvec3 normal{0, 0, 0};   ///< unit, from on_a to on_b; 0 if they coincide or are not known
     glm::dvec3 normal_b{0, 0, 0}; ///< the same as B's frame has it
 
-    DistanceSearch(const TreeView& tree_a, const Pose& pose_a, const TreeView& tree_b, const Pose& pose_b,
-                   QueryContext& context, const DistanceOptions& distance_options) noexcept;
+    DistanceSearch(const OrderedBodies<Pose>& bodies, QueryContext& context,
+                   const DistanceOptions& distance_options) noexcept;
 
-    /// What is at least so far apart, > 0, need not be looked at: it cannot improve the answer by more than the
+    /// Pairs whose bound is at least this, > 0, need not be looked at: they cannot improve the answer by more than the
     /// tolerance, nor meet.
     double enough() const {
         const double improving = upper < kInfinity ? upper - tolerance(upper) : kInfinity;
@@ -54,7 +56,7 @@ struct DistanceSearch {
         return std::max(options.tolerance_absolute, options.tolerance_relative * distance);
     }
     /// Tests left of the budget.
-    uint64_t left() const { return options.max_pair_tests - std::min(options.max_pair_tests, stats.tests()); }
+    uint64_t left() const { return tests_left(options.max_pair_tests, stats.tests()); }
     double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
 
     /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing
@@ -67,14 +69,14 @@ struct DistanceSearch {
     static constexpr double kLeastTolerance = 1e-12, kMostTolerance = 1;
 
 private:
-    // How far the corners of leaves reach along `normal`, or B's against it: few leaves are asked for often.
+    // Supports of leaves along `normal`, or of B's against it: few leaves are asked for often.
     struct Support {
         uint32_t leaf = UINT32_MAX;
         double reach;
     };
     using Supports = std::array<Support, 16>;
     Supports supports_a_, supports_b_;
-    double corners_reach_; // share of S (triangle.hpp) of all corners
+    double triangle_reach_; // S of query/triangle/support.hpp
 
     double gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
     void take(const TriangleDistance& found, const MeetingPair& pair, double bound, bool meet) noexcept;
@@ -86,7 +88,7 @@ private:
 /// Bound on the distance of the roots, from spheres around them, in double precision.
 double root_bound(const DistanceSearch& search) noexcept;
 
-/// The search itself: leaves every pair of leaves decided, skipped or open.
-void search(DistanceSearch& query) noexcept;
+/// The traversal: leaves every pair of leaves decided, skipped or open.
+void traverse(DistanceSearch& search) noexcept;
 
 } // namespace prolate::query

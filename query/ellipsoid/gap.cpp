@@ -54,9 +54,9 @@ double rough_exp(double x) {
     return (2 + x) / (2 - x);
 }
 
-class Search {
+class DirectionSearch {
 public:
-    Search(const PlacedEllipsoid& a, const PlacedEllipsoid& b)
+    DirectionSearch(const PlacedEllipsoid& a, const PlacedEllipsoid& b)
         : a_(a), b_(b), r_(b.center - a.center), q1_(a.factor * glm::transpose(a.factor)),
           q2_(b.factor * glm::transpose(b.factor)), scale_(a.reach + b.reach), slack_(kSeparationMargin * scale_) {}
 
@@ -274,19 +274,19 @@ double least_width(const dmat3& l, double size) noexcept {
 
 Gap distance_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double tolerance,
                 const dvec3& start_normal) noexcept {
-    Search search(a, b);
+    DirectionSearch search(a, b);
     search.climb(tolerance, start_normal);
     return search.out_;
 }
 
-bool apart(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin) noexcept {
+bool separated(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin) noexcept {
     if (margin != 0) return distance_of(a, b, kDistanceTolerance * (margin + a.size + b.size)).lower > margin;
     const PairVerdict verdict = test_pair(a, b).verdict;
     return verdict == PairVerdict::separated || (verdict == PairVerdict::unresolved && distance_of(a, b, 0).lower > 0);
 }
 
 Gap depth_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double tolerance, const dvec3& start_normal) noexcept {
-    Search search(a, b);
+    DirectionSearch search(a, b);
     search.climb(tolerance, {0, 0, 0});
     if (search.deep_) search.try_thin_directions();
     if (glm::dot(start_normal, start_normal) > 0) search.consider(unit(start_normal));

@@ -68,7 +68,7 @@ Gap distance_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double toler
 
 /// Are two leaves certainly farther apart than `margin` >= 0? All queries of trees decide so on the ellipsoids of two
 /// leaves: placed alike (order.hpp), they get the same answer to the bit. With an infinite or NaN margin, never.
-bool apart(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin = 0) noexcept;
+bool separated(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin = 0) noexcept;
 
 /// Depth, for bodies that overlap: -lower is the least depth found, with the normal along which B leaves A soonest. It
 /// stops when a step gains less than `tolerance`. -upper is a certified depth, if a loose one.

@@ -11,7 +11,7 @@ namespace prolate::query {
 using glm::dmat3;
 using glm::dvec3;
 
-glm::dvec3 outwards(const dmat3& factor, const dmat3& q, const dvec3& x) noexcept {
+glm::dvec3 nearest_direction(const dmat3& factor, const dmat3& q, const dvec3& x) noexcept {
     constexpr int kNewtonSteps = 16;
     double t = 0;
     dvec3 s = x;

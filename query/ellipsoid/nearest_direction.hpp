@@ -11,6 +11,6 @@ namespace prolate::query {
 /// The nearest point is Q s, s = (Q + t I)^-1 x, for the t > 0 with |L^T s| = 1, and s is the direction: Newton's
 /// method on 1 / |L^T s|, which is almost linear in t (More and Sorensen 1983, "Computing a trust region step", section
 /// 3). What rounding or too few steps leave makes it less accurate, and no more.
-glm::dvec3 outwards(const glm::dmat3& factor, const glm::dmat3& q, const glm::dvec3& x) noexcept;
+glm::dvec3 nearest_direction(const glm::dmat3& factor, const glm::dmat3& q, const glm::dvec3& x) noexcept;
 
 } // namespace prolate::query

@@ -8,6 +8,7 @@
 #include "query/inside/axis_lanes-inl.hpp"
 #include "query/inside/crossing.hpp"
 #include "query/inside/inside.hpp"
+#include "query/node/limits.hpp"
 #include "src/bytes.hpp"
 
 #include <glm/geometric.hpp>
@@ -19,9 +20,9 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
-class WindingSearch {
+class WindingTraversal {
 public:
-    WindingSearch(const TreeView& tree, const PlacedPoint& point, QueryStats& stats, uint64_t most_tests)
+    WindingTraversal(const TreeView& tree, const PlacedPoint& point, QueryStats& stats, uint64_t most_tests)
         : tree_(tree), point_(point), at_(lattice_point(point, tree.lattice())), stats_(stats), most_tests_(most_tests),
           step_exponent_(tree.lattice().step_exponent) {}
 
@@ -44,7 +45,7 @@ private:
         Family family; // the children of the root
     };
 
-    uint64_t left() const { return most_tests_ - std::min(most_tests_, stats_.tests()); }
+    uint64_t left() const { return tests_left(most_tests_, stats_.tests()); }
     bool take(uint32_t count) {
         if (count > left()) return false;
         stats_.pair_tests += count, ++stats_.block_tests;
@@ -131,7 +132,7 @@ private:
 
 std::optional<int64_t> winding_number_target(const TreeView& tree, const PlacedPoint& point, QueryStats& stats,
                                              uint64_t most_tests) {
-    return WindingSearch(tree, point, stats, most_tests).run();
+    return WindingTraversal(tree, point, stats, most_tests).run();
 }
 
 } // namespace

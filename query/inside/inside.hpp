@@ -7,7 +7,7 @@
 // coordinates and that of the vertices; nearer ones may count as inside or outside. For such points, and for surfaces
 // with open edges, the direction may decide.
 //
-// Nodes are culled eight at a time (ray_lanes-inl.hpp).
+// Nodes are culled eight at a time (axis_lanes-inl.hpp).
 #pragma once
 
 #include "query/ellipsoid/placed.hpp"

@@ -1,8 +1,10 @@
-// What queries make of numbers that no length can be, as query.hpp has it.
+// What queries make of their options: of numbers that no length can be, as query.hpp has it, and of their budget.
 #pragma once
 
 #include <prolate/query.hpp>
 
+#include <algorithm>
+#include <cstdint>
 #include <limits>
 
 namespace prolate::query {
@@ -19,6 +21,11 @@ inline double sound_tolerance(double x) noexcept {
 inline QueryOptions sound(QueryOptions options) noexcept {
     options.margin = sound_length(options.margin);
     return options;
+}
+
+/// Tests left of a budget.
+inline uint64_t tests_left(uint64_t budget, uint64_t used) noexcept {
+    return budget - std::min(used, budget);
 }
 
 } // namespace prolate::query

@@ -1,8 +1,10 @@
-// Swapped arguments must give the same answer in spite of rounding, and different queries the same verdict, so all
-// queries of two bodies work in one fixed order of them. It depends on the trees alone if these differ: poses change
-// from step to step, and what follows from the order should not.
+// The canonical order of two bodies. collide(a, b) and collide(b, a) must agree bit for bit in spite of rounding, and
+// different queries must give the same verdict, so every query of two bodies first puts them in one order, and
+// exchanges them in its answer if need be. The order depends on the trees alone if these differ: poses change from step
+// to step, and what follows from the order should not.
 #pragma once
 
+#include <prolate/collide.hpp>
 #include <prolate/tree.hpp>
 #include <prolate/types.hpp>
 
@@ -13,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 namespace prolate::query {
 
@@ -34,15 +37,37 @@ inline const Pose& start_of(const Pose& pose) {
 template <class Motion> const Pose& start_of(const Motion& motion) {
     return motion.start;
 }
-/// Is body `b` to be taken first? The header, which has hashes of the rest, tells most trees apart; to read on would
-/// take long for copies of one.
+/// Two bodies in their canonical order, each with its Pose or Motion.
+template <class Placement> struct OrderedBodies {
+    const TreeView &a, &b;
+    const Placement &place_a, &place_b;
+    bool exchanged; ///< the caller has them the other way round
+};
+/// All arguments must outlive what it returns. The header of a file, which has hashes of the rest, tells most trees
+/// apart; to read on would take long for copies of one.
 template <class Placement>
-bool must_swap(const TreeView& a, const Placement& place_a, const TreeView& b, const Placement& place_b) {
-    constexpr size_t kHeader = 256;
-    if (const auto order = compare(b, a, kHeader); order != 0) return order < 0;
-    if (const auto order = compare(start_of(place_b), start_of(place_a)); order != 0) return order < 0;
-    if (const auto order = compare(b, a, SIZE_MAX); order != 0) return order < 0;
-    return compare(place_b, place_a) < 0;
+OrderedBodies<Placement> in_canonical_order(const TreeView& a, const Placement& place_a, const TreeView& b,
+                                            const Placement& place_b) {
+    const auto order = [&] {
+        constexpr size_t kHeader = 256;
+        if (const auto by_header = compare(a, b, kHeader); by_header != 0) return by_header;
+        if (const auto by_start = compare(start_of(place_a), start_of(place_b)); by_start != 0) return by_start;
+        if (const auto by_bytes = compare(a, b, SIZE_MAX); by_bytes != 0) return by_bytes;
+        return compare(place_a, place_b);
+    }();
+    if (order > 0) return {.a = b, .b = a, .place_a = place_b, .place_b = place_a, .exchanged = true};
+    return {.a = a, .b = b, .place_a = place_a, .place_b = place_b, .exchanged = false};
+}
+
+/// A pair of nodes as the other order has it.
+inline MeetingPair exchanged(const MeetingPair& pair) {
+    return {pair.node_b, pair.node_a, pair.triangle_b, pair.triangle_a};
+}
+/// Exchanges the bodies of a DistanceResult or SweepResult.
+template <class Result> void exchange_bodies(Result& result) {
+    result.pair = exchanged(result.pair);
+    std::swap(result.point_a, result.point_b);
+    result.normal = {-result.normal.x, -result.normal.y, -result.normal.z};
 }
 
 } // namespace prolate::query

@@ -4,8 +4,13 @@ namespace prolate::query {
 
 TreeSide tree_side(const TreeView& tree, uint32_t max_level) noexcept {
     const uint32_t last = tree.level_count() - 1;
-    const uint32_t limit = max_level < last ? tree.first_slot(max_level) : UINT32_MAX;
-    return {tree, tree.lattice(), tree.first_slot(last), limit};
+    return {.tree = tree,
+            .lattice = tree.lattice(),
+            .blocks = tree.block(0),
+            .bounding_blocks = tree.bounding_block(0),
+            .hulls = tree.has_triangles() ? tree.hull(0) : nullptr,
+            .leaves_from = tree.first_slot(last),
+            .limit_from = max_level < last ? tree.first_slot(max_level) : UINT32_MAX};
 }
 
 } // namespace prolate::query

@@ -66,7 +66,7 @@ public:
     double end(const dvec3& n) const { return glm::dot(n, e_.center) + glm::length(n * e_.factor); }
     dvec3 towards(const dvec3& x) const {
         const dvec3 r = x - e_.center;
-        return glm::length(solve(e_.factor, r)) > 1 ? outwards(e_.factor, q_, r) : dvec3(0);
+        return glm::length(solve(e_.factor, r)) > 1 ? nearest_direction(e_.factor, q_, r) : dvec3(0);
     }
 
 private:
@@ -101,8 +101,8 @@ private:
 
 constexpr int kNewtonSteps = 64;
 
-template <class Body>
-std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Body& body, double tolerance) {
+template <class Convex>
+std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Convex& body, double tolerance) {
     dvec3 n(0);
     double gap = 0, slope = 0; // along n, of the ray's begin; and how it grows
     const auto look_from = [&](double t) {
@@ -118,7 +118,7 @@ std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Body
     double t = 0;
     for (int i = 0; i < kNewtonSteps; ++i) {
         look_from(t);
-        // Certainly apart until the gap falls to `tolerance`; the hit is certain enough within twice that.
+        // Certainly separated until the gap falls to `tolerance`; the hit is certain enough within twice that.
         const double here = gap + t * slope - tolerance;
         if (!(here > tolerance)) break;
         if (gap + ray.length * slope > tolerance) return {};

@@ -29,7 +29,7 @@
 #pragma once
 
 #include "query/ellipsoid/separation.hpp"
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/placed.hpp"
 
 #include <prolate/raycast.hpp>
 

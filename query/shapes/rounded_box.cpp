@@ -146,13 +146,13 @@ struct EllipsoidBody {
 };
 
 // (1) of the header, for a unit vector.
-template <class Body> bool parts(const dvec3& n, const Body& body, const RoundedBox& box, double margin) {
+template <class Convex> bool separates(const dvec3& n, const Convex& body, const RoundedBox& box, double margin) {
     return body.begin(n) - width(box, n) - box.radius > margin * (body.reach + box.reach);
 }
 
-enum class Outcome : uint8_t { apart, meet, unresolved };
+enum class Outcome : uint8_t { separated, meet, unresolved };
 
-template <class Body> Outcome search(const Body& body, const RoundedBox& box, double margin) {
+template <class Convex> Outcome gjk(const Convex& body, const RoundedBox& box, double margin) {
     const double scale = body.reach + box.reach;
     Simplex simplex;
     dvec3 v = body.middle();
@@ -160,7 +160,7 @@ template <class Body> Outcome search(const Body& body, const RoundedBox& box, do
         const double length = glm::length(v);
         if (!(length > kNearest * scale)) return step == 0 ? Outcome::meet : Outcome::unresolved;
         const dvec3 n = v / length;
-        if (parts(n, body, box, margin)) return Outcome::apart;
+        if (separates(n, body, box, margin)) return Outcome::separated;
         if (step > 0 && length <= box.radius) return Outcome::meet;
         const dvec3 w = body.first(n) - corner(box, n);
         if (step > 0 && !(glm::dot(v, v - w) > kSmallestGain * length * length)) return Outcome::unresolved;
@@ -174,13 +174,13 @@ template <class Body> Outcome search(const Body& body, const RoundedBox& box, do
 }
 
 // Directions that do not lose digits when the bodies nearly touch: the normals of faces, and the products of edges.
-bool parts_by_features(const PlacedTriangle& triangle, const RoundedBox& box, double margin) {
+bool separated_by_features(const PlacedTriangle& triangle, const RoundedBox& box, double margin) {
     const TriangleBody body(triangle, box.center);
     const auto either = [&](const dvec3& direction) {
         const double length = glm::length(direction);
         if (!(length > 0)) return false;
         const dvec3 n = direction / length;
-        return parts(n, body, box, margin) || parts(-n, body, box, margin);
+        return separates(n, body, box, margin) || separates(-n, body, box, margin);
     };
     const auto& c = triangle.corner;
     const dvec3 edges[3] = {c[1] - c[0], c[2] - c[1], c[0] - c[2]}, normal = glm::cross(edges[0], edges[1]);
@@ -227,20 +227,21 @@ PlacedHalfSpace place(const HalfSpace& half_space, const Pose& pose, double marg
     return {to_frame.rotation * unit, offset - glm::dot(unit, t), std::abs(offset) + glm::length(t)};
 }
 
-bool apart(const PlacedTriangle& triangle, const RoundedBox& box, double margin) noexcept {
-    const Outcome outcome = search(TriangleBody(triangle, box.center), box, margin);
-    return outcome == Outcome::apart || (outcome == Outcome::unresolved && parts_by_features(triangle, box, margin));
+bool separated(const PlacedTriangle& triangle, const RoundedBox& box, double margin) noexcept {
+    const Outcome outcome = gjk(TriangleBody(triangle, box.center), box, margin);
+    return outcome == Outcome::separated ||
+           (outcome == Outcome::unresolved && separated_by_features(triangle, box, margin));
 }
 
-bool apart(const PlacedEllipsoid& ellipsoid, const RoundedBox& box, double margin) noexcept {
-    return search(EllipsoidBody(ellipsoid, box.center), box, margin) == Outcome::apart;
+bool separated(const PlacedEllipsoid& ellipsoid, const RoundedBox& box, double margin) noexcept {
+    return gjk(EllipsoidBody(ellipsoid, box.center), box, margin) == Outcome::separated;
 }
 
-bool apart(const PlacedTriangle& triangle, const PlacedHalfSpace& h, double margin) noexcept {
+bool separated(const PlacedTriangle& triangle, const PlacedHalfSpace& h, double margin) noexcept {
     return TriangleBody(triangle, dvec3(0)).begin(h.normal) - h.offset > margin * (triangle.reach + h.reach);
 }
 
-bool apart(const PlacedEllipsoid& ellipsoid, const PlacedHalfSpace& h, double margin) noexcept {
+bool separated(const PlacedEllipsoid& ellipsoid, const PlacedHalfSpace& h, double margin) noexcept {
     return EllipsoidBody(ellipsoid, dvec3(0)).begin(h.normal) - h.offset > margin * (ellipsoid.reach + h.reach);
 }
 

@@ -21,7 +21,7 @@
 #pragma once
 
 #include "query/ellipsoid/separation.hpp"
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/placed.hpp"
 
 #include <prolate/shapes.hpp>
 
@@ -51,11 +51,11 @@ PlacedHalfSpace place(const HalfSpace& half_space, const Pose& pose, double marg
 
 /// True only if they have no common point. The margin is a parameter only so that the tests can show that wrong ones
 /// are caught.
-bool apart(const PlacedTriangle& triangle, const RoundedBox& box, double margin = kSeparationMargin) noexcept;
-bool apart(const PlacedEllipsoid& ellipsoid, const RoundedBox& box, double margin = kSeparationMargin) noexcept;
-bool apart(const PlacedTriangle& triangle, const PlacedHalfSpace& half_space,
-           double margin = kSeparationMargin) noexcept;
-bool apart(const PlacedEllipsoid& ellipsoid, const PlacedHalfSpace& half_space,
-           double margin = kSeparationMargin) noexcept;
+bool separated(const PlacedTriangle& triangle, const RoundedBox& box, double margin = kSeparationMargin) noexcept;
+bool separated(const PlacedEllipsoid& ellipsoid, const RoundedBox& box, double margin = kSeparationMargin) noexcept;
+bool separated(const PlacedTriangle& triangle, const PlacedHalfSpace& half_space,
+               double margin = kSeparationMargin) noexcept;
+bool separated(const PlacedEllipsoid& ellipsoid, const PlacedHalfSpace& half_space,
+               double margin = kSeparationMargin) noexcept;
 
 } // namespace prolate::query

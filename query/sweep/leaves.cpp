@@ -2,7 +2,7 @@
 //
 // Along a fixed direction n the gap of two convex pieces, seen t from now, is at least
 //     G(t) = n.(c_b - c_a) + t n.(v_b - v_a) - h_a(n + t m_a) - h_b(-n - t m_b) - curve t^2 / 2 - rounding,
-// h their supports about the points turned about, m = n x w and `curve` as in sweep_lanes-inl.hpp: a piece's points
+// h their supports about the points turned about, m = n x w and `curve` as in lanes-inl.hpp: a piece's points
 // move by their present velocity, up to a second order that is bounded. Supports are convex, so G is concave: where
 // G(t) >= 0 it was so all the time before, and where a chord of it is. This takes all corners of a triangle by their
 // own speeds, so that a corner at rest does not stop what others do (a box that tips over an edge), where one bound for
@@ -10,9 +10,8 @@
 //
 // n is the direction along which the pieces' distance is certified from below; an inexact one costs steps only.
 #include "query/ellipsoid/gap.hpp"
-#include "query/node/limits.hpp"
 #include "query/sweep/search.hpp"
-#include "query/triangle/ellipsoid.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -87,7 +86,7 @@ Nearest nearest(const TrianglePiece& x, const TrianglePiece& y, const dvec3&, do
 }
 Nearest nearest(const TrianglePiece& x, const EllipsoidPiece& y, const dvec3&, double) {
     const TriangleDistance d = distance(x.placed, y.placed);
-    return nearest(d, !apart(x.placed, y.placed));
+    return nearest(d, !separated(x.placed, y.placed));
 }
 Nearest nearest(const EllipsoidPiece& x, const TrianglePiece& y, const dvec3& n, double tolerance) {
     Nearest out = nearest(y, x, n, tolerance);
@@ -96,7 +95,7 @@ Nearest nearest(const EllipsoidPiece& x, const TrianglePiece& y, const dvec3& n,
 }
 Nearest nearest(const EllipsoidPiece& x, const EllipsoidPiece& y, const dvec3& n, double tolerance) {
     const Gap gap = distance_of(x.placed, y.placed, tolerance, n);
-    return {std::max(gap.upper, 0.0), !apart(x.placed, y.placed), gap.point_a, gap.point_b, gap.normal};
+    return {std::max(gap.upper, 0.0), !separated(x.placed, y.placed), gap.point_a, gap.point_b, gap.normal};
 }
 
 void store(const dvec3& v, float (&out)[3]) {
@@ -130,10 +129,10 @@ MotionFrame frame(const LatticePose& y_to_x, const LatticeInfo& lattice, const d
 
 } // namespace
 
-SweepSearch::SweepSearch(const TreeView& tree_a, const Motion& motion_a, const TreeView& tree_b, const Motion& motion_b,
-                         QueryContext& context, const SweepOptions& sweep_options) noexcept
-    : a(tree_side(tree_a, sweep_options.max_level)), b(tree_side(tree_b, sweep_options.max_level)),
-      motion(motion_a, motion_b), options(sound(sweep_options)), entries(context.entries) {
+SweepSearch::SweepSearch(const OrderedBodies<Motion>& bodies, QueryContext& context,
+                         const SweepOptions& sweep_options) noexcept
+    : a(tree_side(bodies.a, sweep_options.max_level)), b(tree_side(bodies.b, sweep_options.max_level)),
+      motion(bodies.place_a, bodies.place_b), options(sound(sweep_options)), entries(context.entries) {
     move_to(0);
     const PlacedEllipsoid x = place(a.tree.root()), y = place(b.tree.root(), now.b_to_a);
     const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);

@@ -1,7 +1,9 @@
-// One sweep() query: what the vectorised search (sweep.cpp) and the decisions at its leaves (sweep_leaves.cpp) share.
+// One sweep() query: what the vectorised traversal (search.cpp) and the decisions at its leaves (leaves.cpp) share.
 #pragma once
 
 #include "query/node/lattice.hpp"
+#include "query/node/limits.hpp"
+#include "query/node/order.hpp"
 #include "query/node/tree_side.hpp"
 #include "query/sweep/motion.hpp"
 #include "query/sweep/motion_frame.hpp"
@@ -10,9 +12,7 @@
 
 #include <glm/vec3.hpp>
 
-#include <algorithm>
 #include <cstdint>
-#include <limits>
 
 namespace prolate::query {
 
@@ -34,10 +34,11 @@ struct SweepSearch {
     Instant now{};
     MotionFrame frame_a{}, frame_b{};
 
-    /// At the start, does one body hold a part of the other? Settled before the search, as in distance_search.hpp.
+    /// At the start, does one body hold a part of the other? Settled before the traversal, as in
+    /// query/distance/search.hpp.
     Verdict enclosure = Verdict::separated;
     bool complete = false; ///< no budget ran out
-    double open = 1;       ///< what is left of the search keeps apart until then
+    double open = 1;       ///< pairs that were not looked at keep apart until then
     /// The earliest meeting found, or 1.
     double horizon = 1;
     bool found = false;
@@ -45,8 +46,7 @@ struct SweepSearch {
     MeetingPair witness;
     glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0}, normal{0, 0, 0}; ///< then, in A's frame
 
-    SweepSearch(const TreeView& tree_a, const Motion& motion_a, const TreeView& tree_b, const Motion& motion_b,
-                QueryContext& context, const SweepOptions& sweep_options) noexcept;
+    SweepSearch(const OrderedBodies<Motion>& bodies, QueryContext& context, const SweepOptions& sweep_options) noexcept;
 
     void move_to(double t) noexcept;
 
@@ -57,7 +57,7 @@ struct SweepSearch {
     /// Tests of triangles that advance() takes, at most.
     uint64_t triangle_tests(uint32_t node_a, uint32_t node_b, bool as_covers) const noexcept;
     /// Tests left of the budget.
-    uint64_t left() const { return options.max_pair_tests - std::min(options.max_pair_tests, stats.tests()); }
+    uint64_t left() const { return tests_left(options.max_pair_tests, stats.tests()); }
 
 private:
     template <class X, class Y>
@@ -69,7 +69,7 @@ private:
 /// Time in which a gap > 0 may close, if it closes by at most rate t + curve t^2 / 2, and by at most most_rate t.
 double closing_time(double gap, double rate, double curve, double most_rate) noexcept;
 
-/// The search itself.
-void search(SweepSearch& query) noexcept;
+/// The traversal: finds the earliest meeting, or how long the bodies keep apart.
+void traverse(SweepSearch& search) noexcept;
 
 } // namespace prolate::query

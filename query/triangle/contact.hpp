@@ -26,7 +26,7 @@
 #pragma once
 
 #include "query/triangle/climb.hpp"
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/placed.hpp"
 
 #include <cstdint>
 #include <limits>

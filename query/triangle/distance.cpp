@@ -29,9 +29,9 @@ std::optional<dvec3> foot(const dvec3& x, const dvec3 (&corner)[3], const dvec3 
     return weight[0] / sum * corner[0] + weight[1] / sum * corner[1] + weight[2] / sum * corner[2];
 }
 
-class Search {
+class TriangleDistanceSearch {
 public:
-    explicit Search(const TrianglePair& pair) : pair_(pair), x_(pair.p[0]), y_(pair.q[0]) {}
+    explicit TriangleDistanceSearch(const TrianglePair& pair) : pair_(pair), x_(pair.p[0]), y_(pair.q[0]) {}
 
     void run() {
         if (!edges_settle() && !faces_settle()) pair_.any_direction([&](const dvec3& n) { return bound_by(n); });
@@ -107,12 +107,12 @@ private:
 
 TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, double margin) noexcept {
     const TrianglePair pair(a, b);
-    Search search(pair);
+    TriangleDistanceSearch search(pair);
     search.run();
     const double bound = margin * (a.reach + b.reach);
     TriangleDistance out = search.result(bound);
-    if (!(out.lower > kDoubtful * bound)) // its directions are others than those of apart()
-        out.lower = apart(a, b, 0, margin) ? std::max(out.lower, std::numeric_limits<double>::min()) : 0;
+    if (!(out.lower > kDoubtful * bound)) // its directions are others than those of separated()
+        out.lower = separated(a, b, 0, margin) ? std::max(out.lower, std::numeric_limits<double>::min()) : 0;
     return out;
 }
 

@@ -16,7 +16,7 @@
 // S: there the direction from one closest point to the other has lost its digits.
 #pragma once
 
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/separation.hpp"
 
 namespace prolate::query {
 
@@ -29,8 +29,8 @@ struct TriangleDistance {
     // direction.
     glm::dvec3 normal{0, 0, 0};
 };
-/// With the same margin, `lower` is positive only if apart() of triangle.hpp holds, and always if it does. The margin
-/// is a parameter only so that the tests can show that wrong ones are caught.
+/// With the same margin, `lower` is positive only if separated() of triangle.hpp holds, and always if it does. The
+/// margin is a parameter only so that the tests can show that wrong ones are caught.
 TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, double margin = kSeparationMargin) noexcept;
 /// A lower bound from one direction n, of length 1 but for rounding, pointing from A to B.
 double gap_along(const PlacedTriangle& a, const PlacedTriangle& b, const glm::dvec3& n) noexcept;

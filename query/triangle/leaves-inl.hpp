@@ -34,7 +34,7 @@ inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const Tr
                 const uint32_t i = first_a + fours.in_a(pair + lane), j = first_b + fours.in_b(pair + lane);
                 if ((verdicts.meet >> lane & 1) == 0) {
                     ++result.exact_tests;
-                    if (apart(query::place(a, i), query::place(b, j, b_to_a), distance)) continue;
+                    if (separated(query::place(a, i), query::place(b, j, b_to_a), distance)) continue;
                 }
                 result.pair_tests += lane + 1;
                 result.meet = true, result.triangle_a = i, result.triangle_b = j;

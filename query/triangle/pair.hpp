@@ -1,8 +1,8 @@
-// Two triangles seen from a corner of the first, and the directions that may separate them. What triangle.hpp says of
+// Two triangles seen from a corner of the first, and the directions that may separate them. What separation.hpp says of
 // rounding holds for gap().
 #pragma once
 
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/placed.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -58,7 +58,7 @@ struct TrianglePair {
         return y.low - x.high >= x.low - y.high;
     }
 
-    /// Calls visit(n) for each candidate direction (triangle.hpp) until one returns true; did one?
+    /// Calls visit(n) for each candidate direction (separation.hpp) until one returns true; did one?
     template <class Visit> bool any_direction(Visit&& visit) const {
         if (visit(normal_a) || visit(normal_b)) return true;
         for (const glm::dvec3& di : d)

@@ -9,7 +9,7 @@
 namespace prolate::query {
 namespace {
 
-template <class Index> double support(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) {
+template <class Index> double support_of(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) {
     const std::byte* index = tree.triangle_bytes() + size_t{range.first} * 3 * sizeof(Index);
     double most = -HUGE_VAL;
     for (uint32_t i = 0; i < 3 * range.count; ++i, index += sizeof(Index)) {
@@ -22,11 +22,11 @@ template <class Index> double support(const TreeView& tree, const TriangleRange&
 
 } // namespace
 
-double support_of_corners(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) noexcept {
-    return tree.vertex_count() <= 0x10000 ? support<uint16_t>(tree, range, n) : support<uint32_t>(tree, range, n);
+double triangle_support(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) noexcept {
+    return tree.vertex_count() <= 0x10000 ? support_of<uint16_t>(tree, range, n) : support_of<uint32_t>(tree, range, n);
 }
 
-double reach_of_corners(const TreeView& tree) noexcept {
+double triangle_reach(const TreeView& tree) noexcept {
     return place(tree.root()).reach;
 }
 

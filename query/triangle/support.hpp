@@ -4,7 +4,7 @@
 // With n from A to B, of length 1 but for rounding, the triangles are apart by at least
 //     n.t - support(A, n) - support(B, -R^T n),     x_A = R x_B + t.
 // The terms of its error are those of triangle.hpp: there B's corners are turned, here the direction, with the same
-// error, so kSeparationMargin S pays for it; S = reach_of_corners(A) + reach_of_corners(B) + |t|.
+// error, so kSeparationMargin S pays for it; S = triangle_reach(A) + triangle_reach(B) + |t|.
 #pragma once
 
 #include <prolate/tree.hpp>
@@ -14,9 +14,9 @@
 namespace prolate::query {
 
 /// The greatest n.x of the corners x of some triangles, body frame.
-double support_of_corners(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) noexcept;
+double triangle_support(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) noexcept;
 
 /// Bounds the distance of an exact tree's corners from its frame's origin: they lie in the root.
-double reach_of_corners(const TreeView& tree) noexcept;
+double triangle_reach(const TreeView& tree) noexcept;
 
 } // namespace prolate::query

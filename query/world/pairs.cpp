@@ -32,10 +32,10 @@ struct Findings {
 };
 
 // The search of one worker in one range: collects before it writes, so that the counter is not fought for.
-class Search {
+class PairCollector {
 public:
-    Search(const World::State& state, Findings& findings) : s_(state), findings_(findings) {}
-    ~Search() {
+    PairCollector(const World::State& state, Findings& findings) : s_(state), findings_(findings) {}
+    ~PairCollector() {
         flush();
         findings_.box_tests.fetch_add(box_tests_, std::memory_order_relaxed);
     }
@@ -100,7 +100,7 @@ uint64_t World::State::find_pairs(const Jobs& jobs) {
         Findings findings{found};
         query::for_ranges(jobs, static_cast<uint32_t>(changed.size()), kGrain,
                           [&](uint32_t begin, uint32_t end, uint32_t) {
-                              Search search(*this, findings);
+                              PairCollector search(*this, findings);
                               for (uint32_t i = begin; i < end; ++i) search.look_up(changed[i]);
                           });
         const uint64_t total = findings.count;

@@ -99,9 +99,9 @@ double root_reach(const TreeView& tree, const dvec3& r, double rounding) {
     return std::min(boxes[0].most, hull_reach(tree, 0, children, r, rounding).most);
 }
 
-class Search {
+class ReachSearch {
 public:
-    Search(const TreeView& tree, const dvec3& direction, double rounding, double tolerance)
+    ReachSearch(const TreeView& tree, const dvec3& direction, double rounding, double tolerance)
         : tree_(tree), r_(direction), rounding_(rounding), tolerance_(tolerance) {}
 
     // `root`: at most how far the root reaches.
@@ -195,7 +195,7 @@ Reach reach(const TreeView& tree, const RelativePose& to_world, double tolerance
         const dvec3 axis(to_world.rotation[0][k], to_world.rotation[1][k], to_world.rotation[2][k]);
         const double root[] = {root_reach(tree, axis, rounding), root_reach(tree, -axis, rounding)};
         for (int way = 0; way < 2; ++way) {
-            Search search(tree, way == 0 ? axis : -axis, rounding, tolerance * (root[0] + root[1]));
+            ReachSearch search(tree, way == 0 ? axis : -axis, rounding, tolerance * (root[0] + root[1]));
             out.at[k + 3 * way] = nested ? search.run(root[way]) : search.exhaust();
         }
     }

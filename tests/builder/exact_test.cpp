@@ -1,6 +1,6 @@
 // Exact trees: every triangle in its place, the proof, and queries against brute force over all pairs of triangles.
 #include "builder/random.hpp"
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/separation.hpp"
 #include "src/block.hpp"
 #include "src/bytes.hpp"
 #include "src/format.hpp"
@@ -717,7 +717,7 @@ TEST(ExactQuery, AllPairsAreFoundAndCounted) {
             uint64_t expected = 0;
             for (uint32_t i = 0; i < ta.triangle_count(); ++i)
                 for (uint32_t j = 0; j < tb.triangle_count(); ++j)
-                    expected += !query::apart(query::place(ta, i), query::place(tb, j, b_to_a));
+                    expected += !query::separated(query::place(ta, i), query::place(tb, j, b_to_a));
             ASSERT_EQ(result.found, expected);
             several += result.found > 1;
             const CollideAllResult short_one = collide_all(ta, q.a, tb, q.b, few, context);

@@ -5,8 +5,8 @@
 #include "query/node/order.hpp"
 #include "query/raycast/ray.hpp"
 #include "query/shapes/rounded_box.hpp"
-#include "query/triangle/ellipsoid.hpp"
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
+#include "query/triangle/separation.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
@@ -79,10 +79,8 @@ struct Truth {
     double reach = 0;                            // S of separation.hpp
 
     Truth(const TreeView& a, const TreeView& b, const Query& q) {
-        if (query::must_swap(a, q.a, b, q.b))
-            look(b, a, query::relative_pose(q.b, q.a));
-        else
-            look(a, b, query::relative_pose(q.a, q.b));
+        const auto bodies = query::in_canonical_order(a, q.a, b, q.b);
+        look(bodies.a, bodies.b, query::relative_pose(bodies.place_a, bodies.place_b));
     }
 
 private:
@@ -120,17 +118,17 @@ private:
                 const double apart = glm::distance(x.center, y.center) - x.radius - y.radius;
                 if (apart > 1e-6 && apart > upper) continue; // beyond doubt
                 if (!x.triangle && !y.triangle) {
-                    meet = meet || !query::apart(x.ellipsoid, y.ellipsoid);
+                    meet = meet || !query::separated(x.ellipsoid, y.ellipsoid);
                     const query::Gap gap = query::distance_of(x.ellipsoid, y.ellipsoid, 0);
                     note(std::max(gap.lower, 0.0), std::max(gap.upper, 0.0));
                 } else if (x.triangle && y.triangle) {
-                    meet = meet || !query::apart(*x.triangle, *y.triangle);
+                    meet = meet || !query::separated(*x.triangle, *y.triangle);
                     const query::TriangleDistance d = query::distance(*x.triangle, *y.triangle);
                     note(d.lower, d.upper);
                 } else {
                     const PlacedTriangle& t = x.triangle ? *x.triangle : *y.triangle;
                     const PlacedEllipsoid& e = x.triangle ? y.ellipsoid : x.ellipsoid;
-                    meet = meet || !query::apart(t, e);
+                    meet = meet || !query::separated(t, e);
                     const query::TriangleDistance d = query::distance(t, e);
                     note(d.lower, d.upper);
                 }
@@ -336,7 +334,8 @@ TEST(Agreement, OfRaysAndShapes) {
             const Box box{{ball.center, random.rotation()}, {0.3f, 0.1f, 0.5f}};
             const HalfSpace ground{scenes::to_float(o), static_cast<float>(random.in(-2, 0))};
             const auto any = [&](const auto& shape) {
-                return std::ranges::any_of(leaves, [&](const Ellipsoid& e) { return !apart(query::place(e), shape); });
+                return std::ranges::any_of(leaves,
+                                           [&](const Ellipsoid& e) { return !separated(query::place(e), shape); });
             };
             const auto meets = [&](const auto& shape) {
                 return overlap(tree, pose, shape, *context).verdict == Verdict::overlapping;

@@ -151,7 +151,7 @@ Counts hunt_ellipsoids(uint64_t seed, int count, double ratio, double tolerance,
         begin_at(box, random, touch, n);
         const Vector y = reference::inverse(l) * (touch - Vector{e.center.x, e.center.y, e.center.z});
         const bool meets = reference::dot(y, y) < 1 - 1e-17L && distance(box, touch) <= 1e-15L;
-        const bool apart = query::apart(query::place(e), box, margin);
+        const bool apart = query::separated(query::place(e), box, margin);
         ++counts.cases, counts.apart += apart, counts.meet += meets;
         counts.wrong += apart && (meets || distance(box, x) < 0);
         counts.missed += !apart && gap > tolerance;
@@ -201,7 +201,7 @@ Counts hunt_triangles(uint64_t seed, int count, double tolerance, double margin)
         const Real gap = random.log_in(1e-13, 1e-2) * (random.below(2) == 0 ? 1 : -1);
         RoundedBox box = shape(random, random.log_in(1e-2, 10), n);
         begin_at(box, random, along(at, gap, n), n);
-        const bool meets = distance(box, at) < 0, apart = query::apart(triangle, box, margin);
+        const bool meets = distance(box, at) < 0, apart = query::separated(triangle, box, margin);
         ++counts.cases, counts.apart += apart, counts.meet += meets;
         counts.wrong += apart && meets;
         counts.missed += !apart && gap > tolerance;
@@ -334,10 +334,10 @@ template <class Shape> AnyShape any(const Shape& s) {
         return overlap(tree, pose, s, context(), options);
     };
     out.misses_triangle = [s](const query::PlacedTriangle& t, const Pose& pose, double margin) {
-        return query::apart(t, query::place(s, pose, margin));
+        return query::separated(t, query::place(s, pose, margin));
     };
     out.misses_ellipsoid = [s](const query::PlacedEllipsoid& e, const Pose& pose, double margin) {
-        return query::apart(e, query::place(s, pose, margin));
+        return query::separated(e, query::place(s, pose, margin));
     };
     out.bounded = !std::is_same_v<Shape, HalfSpace>;
     if constexpr (!std::is_same_v<Shape, HalfSpace>)

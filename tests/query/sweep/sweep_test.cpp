@@ -182,12 +182,12 @@ SweepResult overshooting(const Solid& a, const Motion& ma, const Solid& b, const
                          const SweepOptions& options, double overshoot) {
     QueryContext context;
     const TreeView x = a.view(), y = b.view();
-    query::SweepSearch q(x, ma, y, mb, context, options);
-    q.overshoot = overshoot;
-    query::search(q);
+    query::SweepSearch search(query::OrderedBodies<Motion>{x, y, ma, mb, false}, context, options);
+    search.overshoot = overshoot;
+    query::traverse(search);
     SweepResult out;
-    out.verdict = q.found ? Verdict::overlapping : Verdict::separated;
-    out.time_lower = out.time_upper = q.horizon;
+    out.verdict = search.found ? Verdict::overlapping : Verdict::separated;
+    out.time_lower = out.time_upper = search.horizon;
     return out;
 }
 

@@ -143,7 +143,7 @@ TEST_P(ContactFamily, PointsLieOnBothTrianglesAndTheNormalTakesThemApart) {
             p.pose_b.translation.x += static_cast<float>(random.in(-0.2, 0.2)),
                 p.pose_b.translation.y += static_cast<float>(random.in(-0.2, 0.2));
         const auto [a, b] = placed(p);
-        if (query::apart(a, b)) continue;
+        if (query::separated(a, b)) continue;
         ++meeting;
         const auto c = query::contact({a}, {b}, 0);
         const double s = size(p);
@@ -161,8 +161,8 @@ TEST_P(ContactFamily, PointsLieOnBothTrianglesAndTheNormalTakesThemApart) {
         deep += deepest > 1e-3;
         const double way = overlap(a, b, c.normal); // along the normal, or against it
         ASSERT_LE(deepest, way + 1e-9 * s) << i;
-        ASSERT_TRUE(query::apart(a, moved(b, (way + 1e-12 * s) * c.normal)) ||
-                    query::apart(a, moved(b, -(way + 1e-12 * s) * c.normal)))
+        ASSERT_TRUE(query::separated(a, moved(b, (way + 1e-12 * s) * c.normal)) ||
+                    query::separated(a, moved(b, -(way + 1e-12 * s) * c.normal)))
             << i;
     }
     EXPECT_EQ(far, 0u) << farthest;

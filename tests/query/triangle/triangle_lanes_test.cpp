@@ -170,7 +170,7 @@ LeafResult one_by_one(const TreeView& a, TriangleRange in_a, const TreeView& b, 
             for (uint32_t j = four_b; j < end(four_b, in_b); ++j)
                 for (uint32_t i = four_a; i < end(four_a, in_a); ++i) {
                     ++out.pair_tests;
-                    if (query::apart(query::place(a, i), query::place(b, j, b_to_a), distance)) continue;
+                    if (query::separated(query::place(a, i), query::place(b, j, b_to_a), distance)) continue;
                     out.meet = true, out.triangle_a = i, out.triangle_b = j;
                     return out;
                 }

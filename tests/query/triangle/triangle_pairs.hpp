@@ -2,7 +2,7 @@
 // query/ knows of two triangles.
 #pragma once
 
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/placed.hpp"
 #include "src/format.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"

@@ -1,7 +1,7 @@
 // Triangle tests and the point-in-solid test of the query: against exact integers, and against long double.
 #include "query/inside/inside.hpp"
 #include "query/triangle/leaves.hpp"
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/separation.hpp"
 #include "tests/query/triangle/triangle_pairs.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
@@ -29,8 +29,8 @@ bool apart_with(double margin, const Pair& p) {
     const auto bytes_a = leaf_of({p.a.begin(), p.a.end()}, {{0, 1, 2}});
     const auto bytes_b = leaf_of({p.b.begin(), p.b.end()}, {{0, 1, 2}});
     const auto b_to_a = query::relative_pose(p.pose_a, p.pose_b);
-    return query::apart(query::place(*TreeView::open(bytes_a), 0), query::place(*TreeView::open(bytes_b), 0, b_to_a), 0,
-                        margin);
+    return query::separated(query::place(*TreeView::open(bytes_a), 0),
+                            query::place(*TreeView::open(bytes_b), 0, b_to_a), 0, margin);
 }
 bool shipped(const Pair& p) {
     return apart_with(query::kSeparationMargin, p);
@@ -253,9 +253,10 @@ TEST(Triangles, AgainstEllipsoidsAgreeWithTheReference) {
                                                          p.pose_b, p.pose_a.translation);
         const auto bytes = leaf_of({p.a.begin(), p.a.end()}, {{0, 1, 2}});
         const TreeView tree = *TreeView::open(bytes);
-        const bool one = query::apart(query::place(tree, 0), query::place(e, query::relative_pose(p.pose_a, p.pose_b)));
-        const bool other = query::apart(query::place(tree, 0, query::relative_pose(p.pose_b, p.pose_a)),
-                                        query::place(e)); // the ellipsoid as body A
+        const bool one =
+            query::separated(query::place(tree, 0), query::place(e, query::relative_pose(p.pose_a, p.pose_b)));
+        const bool other = query::separated(query::place(tree, 0, query::relative_pose(p.pose_b, p.pose_a)),
+                                            query::place(e)); // the ellipsoid as body A
         for (const bool apart : {one, other}) {
             ASSERT_FALSE(apart && radius < 1) << i;
             ASSERT_FALSE(!apart && radius > 1 + 1e-9L) << i;

@@ -1,6 +1,5 @@
-#include "query/triangle/triangle.hpp"
+#include "query/triangle/separation.hpp"
 
-#include "query/ellipsoid/convert.hpp"
 #include "query/triangle/pair.hpp"
 
 #include <glm/geometric.hpp>
@@ -14,24 +13,7 @@ namespace prolate::query {
 using glm::dmat3;
 using glm::dvec3;
 
-PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept {
-    PlacedTriangle out{};
-    const Triangle corners = tree.triangle(triangle);
-    for (size_t i = 0; i < 3; ++i) {
-        out.corner[i] = to_double(tree.vertex(corners[i]));
-        out.reach = std::max(out.reach, glm::length(out.corner[i]));
-    }
-    return out;
-}
-
-PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose& b_to_a) noexcept {
-    PlacedTriangle out = place(tree, triangle);
-    for (dvec3& corner : out.corner) corner = b_to_a.rotation * corner + b_to_a.translation;
-    out.reach += b_to_a.distance;
-    return out;
-}
-
-bool apart(const PlacedTriangle& a, const PlacedTriangle& b, double distance, double margin) noexcept {
+bool separated(const PlacedTriangle& a, const PlacedTriangle& b, double distance, double margin) noexcept {
     const TrianglePair pair(a, b);
     const double bound = margin * (a.reach + b.reach) + distance;
     return pair.any_direction([&](const dvec3& n) { // false for a NaN, and for zero
@@ -39,7 +21,7 @@ bool apart(const PlacedTriangle& a, const PlacedTriangle& b, double distance, do
     });
 }
 
-bool apart(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid, double margin) noexcept {
+bool separated(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid, double margin) noexcept {
     const dmat3 to_ball = glm::inverse(ellipsoid.factor);
     dvec3 p[3], y[3]; // corners from the center; the same where the ellipsoid is the unit ball
     for (size_t i = 0; i < 3; ++i) {

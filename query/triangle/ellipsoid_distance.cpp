@@ -1,4 +1,4 @@
-#include "query/triangle/ellipsoid.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
 
 #include "query/ellipsoid/nearest_direction.hpp"
 
@@ -18,9 +18,9 @@ using glm::dvec3;
 constexpr double kTight = 1 - 0x1p-40; // a lower bound this near to the upper one is good enough
 constexpr int kEdgeSteps = 32;
 
-class Search {
+class EllipsoidDistanceSearch {
 public:
-    Search(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid)
+    EllipsoidDistanceSearch(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid)
         : ellipsoid_(ellipsoid), p_{triangle.corner[0] - ellipsoid.center, triangle.corner[1] - ellipsoid.center,
                                     triangle.corner[2] - ellipsoid.center},
           q_(ellipsoid.factor * glm::transpose(ellipsoid.factor)), to_ball_(glm::inverse(ellipsoid.factor)) {}
@@ -55,14 +55,14 @@ private:
         return ellipsoid_.factor * (u / glm::length(u));
     }
     // Direction from the ellipsoid's point nearest to x towards x; 0 if x lies inside, which `settles` the matter.
-    dvec3 outwards(const dvec3& x) {
+    dvec3 direction_to(const dvec3& x) {
         const dvec3 u = to_ball_ * x;
         const double radial = glm::length(u);
         if (!(radial > 1)) {
             settles(x, ellipsoid_.factor * u, {1, 0, 0});
             return {0, 0, 0};
         }
-        return query::outwards(ellipsoid_.factor, q_, x);
+        return query::nearest_direction(ellipsoid_.factor, q_, x);
     }
     bool at(const dvec3& x, const dvec3& n) { return settles(x, farthest(n), n); }
 
@@ -95,7 +95,7 @@ private:
         const dvec3 e = to - from;
         double low = 0, high = 1, slope_low = 0, slope_high = 0;
         const auto slope = [&](double s, bool& settled) {
-            const dvec3 x = from + s * e, n = outwards(x);
+            const dvec3 x = from + s * e, n = direction_to(x);
             settled = n == dvec3(0) || at(x, n); // a point inside: they meet
             const double length = glm::length(n);
             return length > 0 ? glm::dot(n, e) / length : 0;
@@ -133,7 +133,7 @@ private:
 } // namespace
 
 TriangleDistance distance(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid, double margin) noexcept {
-    Search search(triangle, ellipsoid);
+    EllipsoidDistanceSearch search(triangle, ellipsoid);
     search.run();
     return search.result(margin * (triangle.reach + ellipsoid.reach));
 }

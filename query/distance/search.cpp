@@ -1,0 +1,281 @@
+// How far apart: best-first branch and bound over pairs of nodes, a block of eight children at a time.
+//
+// Source: Johnson and Cohen, "A framework for efficient minimum distance computations" (1998). A pair of nodes has a
+// certified lower bound on the distance of what lies below them: that of their ellipsoids
+// (query/node/distance_lanes-inl.hpp), or
+// of the pair it comes from, if that is greater. The pair of the least bound is opened first (its larger node; which
+// depends on the pair alone), so that none is opened whose bound is above the distance, and the search ends when the
+// least bound is as good as the nearest leaves found. First of all one descent to the nearest child each time finds
+// two leaves, and an upper bound.
+//
+// The bounds of a pair do not depend on what the search has found so far, and children inherit them. So whatever limit
+// ends the search, a higher limit gives bounds as tight or tighter.
+//
+// Bounds are kept as floats, less the bound of the roots, rounded down: bodies far apart lose no digits.
+//
+// Memory: the pairs in the heap fill the caller's scratch at most. When it is full, pairs are searched depth first,
+// which takes some more tests, until there is room.
+//
+// Complexity: pairs of nodes whose bound is below the distance; for two fine meshes, 100 to 250 block tests.
+#include "query/simd/targets.hpp"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/distance/search.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/distance/search.hpp"
+#include "query/inside/enclosure.hpp"
+#include "query/node/best_first.hpp"
+#include "query/node/distance_lanes-inl.hpp"
+#include "query/node/heap.hpp"
+#include "query/node/side-inl.hpp"
+#include "src/layout.hpp"
+
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+HWY_BEFORE_NAMESPACE();
+namespace prolate::query::HWY_NAMESPACE {
+namespace {
+
+// One of the two trees, as that whose children are tested.
+struct DistanceSide : Side<PlacedNodeWithBox> {
+    DistanceSide(const TreeSide& side, const LatticePose& other_to_here)
+        : Side(side, other_to_here), step(power_of_two(lattice.step_exponent)),
+          per_step(power_of_two(-lattice.step_exponent)), triangles(tree.triangle_bytes()),
+          triangle_bytes(static_cast<uint32_t>(3 * index_bytes(tree.vertex_count()))) {
+        std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);
+    }
+
+    const double step, per_step;      // metres, and lattice steps a metre
+    const std::byte* const triangles; // null without any
+    const uint32_t triangle_bytes;
+    alignas(64) double skipped[kBlockLanes]; // least bound of the nodes that were skipped in each lane, steps
+};
+
+// QueryContext::Entry::bound is the pair's, less that of the roots.
+class DistanceTraversal {
+    using Entry = QueryContext::Entry;
+
+public:
+    explicit DistanceTraversal(DistanceSearch& search)
+        : s_(search),
+          heap_(search.entries), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}},
+          room_(heap_room(search.a.tree, search.b.tree)) {}
+
+    void run() {
+        search();
+        for (const DistanceSide& side : sides_)
+            for (const double bound : side.skipped) s_.skipped = std::min(s_.skipped, bound * side.step);
+        s_.a.deepest = sides_[0].deepest, s_.b.deepest = sides_[1].deepest;
+    }
+
+private:
+    void search() {
+        s_.open = 0;
+        if (budget() < 1) return;
+        s_.open = DistanceSearch::kInfinity;
+        Entry e;
+        const bool near = roots(e);
+        if (!(base_ > 0)) { // they may meet
+            s_.enclosure = look_inside(s_.a.tree, s_.b.tree, s_.b_to_a, s_.stats, s_.options.max_pair_tests);
+            if (s_.enclosure == Verdict::undecided) return stop_at(e);
+            if (s_.enclosure == Verdict::overlapping) s_.upper = 0; // only surfaces that meet are of interest now
+        }
+        if (!near) return done(true);
+        for (bool descending = true;;) {
+            if (are_leaves(e.flags)) {
+                if (!s_.decide(e.node_a, e.node_b, bound_of(e))) return stop_at(e);
+                if (s_.overlapping) return;
+                descending = false;
+            } else if (too_deep(e) && !descending) {
+                s_.open = std::min(s_.open, bound_of(e));
+            } else {
+                if (!open(e)) return stop_at(e);
+                if (count_ > 0) {
+                    const Entry nearest = children_[--count_];
+                    const bool go_on = descending || heap_.empty() || nearest.bound <= heap_.top().bound;
+                    if (!go_on) ++count_;
+                    if (heap_.size() + count_ <= room_) {
+                        for (uint32_t i = 0; i < count_; ++i) heap_.push(children_[i]);
+                    } else if (!depth_first()) {
+                        return go_on ? stop_at(nearest) : done(false);
+                    }
+                    if (s_.overlapping) return;
+                    if (go_on) {
+                        e = nearest;
+                        continue;
+                    }
+                }
+            }
+            if (heap_.empty()) return done(true);
+            e = heap_.pop();
+            if (skips(bound_of(e))) return done(true);
+        }
+    }
+
+    uint64_t budget() const { return s_.left(); }
+    double bound_of(const Entry& e) const { return base_ + double{e.bound}; }
+    bool too_deep(const Entry& e) const { return query::too_deep(e, sides_[0], sides_[1]); }
+    // Notes a pair that need not be looked at.
+    bool skips(double bound) {
+        if (!(bound >= s_.enough())) return false;
+        s_.skipped = std::min(s_.skipped, bound);
+        return true;
+    }
+    // The search ends here: what is in the heap is open, or if `complete` only not better than what was skipped.
+    void done(bool complete) {
+        s_.complete = complete;
+        if (!complete && !heap_.empty()) s_.open = std::min(s_.open, bound_of(heap_.top()));
+    }
+    void stop_at(const Entry& e) {
+        s_.open = std::min(s_.open, bound_of(e));
+        done(false);
+    }
+
+    // The pair of the roots; false if they are far enough apart.
+    bool roots(Entry& e) {
+        const PlacedNodeWithBox& one = sides_[1].place(sides_[0], 0);
+        LaneBounds bounds;
+        bound_lanes(sides_[1].block(0), sides_[1].lattice.step_exponent, one.single, &one.box,
+                    DistanceSearch::kInfinity, bounds);
+        ++s_.stats.pair_tests, ++s_.stats.block_tests;
+        const double bound = bounds.lower[0] * sides_[1].step;
+        base_ = std::isfinite(bound) ? std::max(bound, 0.0) : root_bound(s_);
+        e = {0, 0, 0, root_flags(s_.a.tree, s_.b.tree, bounds.size[0] > one.single.size)};
+        return !skips(base_);
+    }
+
+    // Puts the children of a pair that are not skipped into children_, the nearest last; false if the budget is too
+    // small.
+    bool open(const Entry& e) {
+        count_ = 0;
+        const uint32_t side = e.flags & kOpenB;
+        const uint32_t node = side != 0 ? e.node_b : e.node_a, other = side != 0 ? e.node_a : e.node_b;
+        const ChildRange children = children_in(sides_[side].block(node), node % kBlockLanes);
+        if (children.count > budget()) return false;
+        for_each_block(children, [&](uint32_t first, uint32_t count) {
+            test(e, side, other, first, count);
+            return true;
+        });
+        if (count_ == 0) return true;
+        std::swap(children_[nearest_], children_[count_ - 1]);
+        return true;
+    }
+
+    // What opening a node, or looking at a leaf's triangles, will need: they are seldom in the cache.
+    static HWY_INLINE void prefetch(const DistanceSide& side, const std::byte* block, uint32_t lane, bool leaf) {
+        const uint32_t first = children_in(block, lane).first;
+        if (leaf) {
+            if (side.triangles != nullptr) hwy::Prefetch(side.triangles + size_t{first} * side.triangle_bytes);
+        } else {
+            const std::byte* const children = side.block(first);
+            for (size_t i = 0; i < kBlockBytes; i += kBlockAlignment) hwy::Prefetch(children + i);
+        }
+    }
+
+    // One block against a node of the other tree.
+    HWY_INLINE void test(const Entry& e, uint32_t open, uint32_t other, uint32_t first, uint32_t count) {
+        DistanceSide& side = sides_[open];
+        const std::byte* const block = side.block(first);
+        s_.stats.pair_tests += count, ++s_.stats.block_tests;
+        side.deepest = std::max(side.deepest, first + count - 1);
+        const PlacedNodeWithBox& one = side.place(sides_[open ^ kOpenB], other);
+        const uint32_t other_leaf = e.flags & (open != 0 ? kLeafA : kLeafB);
+        const uint32_t this_leaf = open != 0 ? kLeafB : kLeafA;
+        LaneBounds bounds;
+        bound_lanes(block, side.lattice.step_exponent, one.single, &one.box, s_.enough() * side.per_step, bounds);
+        const DistanceSide& there = sides_[open ^ kOpenB];
+        const std::byte* const hull_one =
+            other_leaf != 0 ? nullptr : hull_of(there.hulls, there.block(other), other % kBlockLanes);
+        const uint32_t nodes = (1u << count) - 1, leaves = side.leaf_lanes(first, block);
+        note_skipped(bounds, nodes & ~bounds.near, side);
+        for (uint32_t near = bounds.near & nodes; near != 0; near &= near - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(near));
+            const bool leaf = (leaves >> lane & 1) != 0;
+            double lower = bounds.lower[lane] * side.step; // less than 0: the deeper, the nearer
+            if (have_hulls_) {
+                lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one,
+                                               leaf ? nullptr : hull_of(side.hulls, block, lane));
+                if (skips(lower)) continue;
+            }
+            const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
+            if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
+            const uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
+            if (count_ == 0 || lower < least_) nearest_ = count_, least_ = lower;
+            const float bound = inherit(e.bound, lower);
+            const uint32_t node = first + lane;
+            children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
+        }
+    }
+    static HWY_INLINE void note_skipped(const LaneBounds& bounds, uint32_t lanes, DistanceSide& side) {
+        if (lanes == 0) return;
+        alignas(8) uint8_t bits[8] = {static_cast<uint8_t>(lanes)};
+        for (size_t i = 0; i < kBlockLanes; i += kDoubleLanes) {
+            bits[0] = static_cast<uint8_t>(lanes >> i);
+            const Double bound = choose(hn::LoadMaskBits(DoubleTag(), bits), load<Double>(bounds.lower + i),
+                                        broadcast<Double>(DistanceSearch::kInfinity));
+            store(min(load<Double>(side.skipped + i), bound), side.skipped + i);
+        }
+    }
+    // The greater of a pair's own bound, as it is kept, and its parent's.
+    float inherit(float parent, double bound) const {
+        const float own = static_cast<float>(bound - base_);
+        const float below = own - (std::abs(own) * 0x1p-22f + 0x1p-120f);
+        return below > parent ? below : parent;
+    }
+
+    // Searches all children_ and all below them, nearest first, on the scratch above the heap. False if the budget
+    // runs out.
+    bool depth_first() {
+        Entry* const stack = s_.entries + heap_.size();
+        uint32_t size = 0;
+        const auto push = [&] { size = static_cast<uint32_t>(std::copy_n(children_, count_, stack + size) - stack); };
+        push();
+        bool within = true;
+        while (size > 0 && !s_.overlapping) {
+            const Entry e = stack[--size];
+            if (skips(bound_of(e))) continue;
+            const bool leaves = are_leaves(e.flags);
+            if (leaves || !too_deep(e))
+                within = within && (leaves ? s_.decide(e.node_a, e.node_b, bound_of(e)) : open(e));
+            if (!within || (!leaves && too_deep(e)))
+                s_.open = std::min(s_.open, bound_of(e));
+            else if (!leaves)
+                push();
+        }
+        return within;
+    }
+
+    DistanceSearch& s_;
+    PairHeap<> heap_;
+    DistanceSide sides_[2];
+    const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
+    double base_ = 0;      // bound of the roots, metres
+    uint32_t room_;        // of the heap: what depth_first() needs is kept free
+    uint32_t count_ = 0;   // of children_
+    uint32_t nearest_ = 0; // of them, while they are tested, and its own bound
+    double least_ = 0;
+    Entry children_[kMaxDegree];
+};
+
+void traverse_target(DistanceSearch& search) {
+    DistanceTraversal(search).run();
+}
+
+} // namespace
+} // namespace prolate::query::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace prolate::query {
+HWY_EXPORT(traverse_target);
+void traverse(DistanceSearch& search) noexcept {
+    HWY_DYNAMIC_DISPATCH(traverse_target)(search);
+}
+} // namespace prolate::query
+#endif // HWY_ONCE

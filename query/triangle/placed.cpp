@@ -1,0 +1,28 @@
+#include "query/triangle/placed.hpp"
+
+#include "query/ellipsoid/convert.hpp"
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+
+namespace prolate::query {
+
+PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept {
+    PlacedTriangle out{};
+    const Triangle corners = tree.triangle(triangle);
+    for (size_t i = 0; i < 3; ++i) {
+        out.corner[i] = to_double(tree.vertex(corners[i]));
+        out.reach = std::max(out.reach, glm::length(out.corner[i]));
+    }
+    return out;
+}
+
+PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose& b_to_a) noexcept {
+    PlacedTriangle out = place(tree, triangle);
+    for (glm::dvec3& corner : out.corner) corner = b_to_a.rotation * corner + b_to_a.translation;
+    out.reach += b_to_a.distance;
+    return out;
+}
+
+} // namespace prolate::query

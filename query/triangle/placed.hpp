@@ -1,0 +1,21 @@
+// Triangles of a tree in the frame of one body, in double precision. What their rounding costs is worked out in
+// query/triangle/separation.hpp.
+#pragma once
+
+#include "query/ellipsoid/placed.hpp"
+
+#include <prolate/tree.hpp>
+
+#include <cstdint>
+
+namespace prolate::query {
+
+/// A triangle placed in A's frame.
+struct PlacedTriangle {
+    glm::dvec3 corner[3];
+    double reach; // largest |corner|, and |t2 - t1| if of body B: its share of S
+};
+PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept;                             // of body A
+PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose& b_to_a) noexcept; // of body B
+
+} // namespace prolate::query
