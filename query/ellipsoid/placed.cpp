@@ -65,6 +65,10 @@ PlacedEllipsoid place(const Ellipsoid& e, const RelativePose& b_to_a) noexcept {
     return out;
 }
 
+double support(const PlacedEllipsoid& e, const dvec3& n) noexcept {
+    return glm::dot(n, e.center) + glm::length(n * e.factor);
+}
+
 PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept {
     const dvec3 exact = to_double(p);
     return {to_frame.rotation * exact + to_frame.translation, glm::length(exact) + to_frame.distance};

@@ -32,6 +32,8 @@ struct PlacedEllipsoid {
 };
 PlacedEllipsoid place(const Ellipsoid& e) noexcept;                             // of body A
 PlacedEllipsoid place(const Ellipsoid& e, const RelativePose& b_to_a) noexcept; // of body B
+/// The greatest n.x of its points x.
+double support(const PlacedEllipsoid& e, const glm::dvec3& n) noexcept;
 
 /// A point in the tree's frame.
 struct PlacedPoint {

@@ -18,7 +18,6 @@ constexpr double kEdgeBias = 0.05;           // an edge's product must overlap b
 constexpr double kParallel = 1e-8;           // sine of an angle: edges that are nearer to parallel have no product
 constexpr double kFlat = 1e-9;               // of the triangles' size: what counts as touching
 constexpr double kCrossing = 1e-6;           // of the triangles' size: what edges may miss each other by
-constexpr double kFacing = 0.9;              // cosine: a face turned farther from a normal is not cut along it
 constexpr double kNoLonger = 0.25;           // share by which ways out may be longer than a known one
 constexpr double kSameDirection = 1 - 1e-10; // cosine: normals that are the same but for rounding
 constexpr double kAskance = 0.3; // cosine: a face that looks this much the same way as the normal is not in contact
@@ -207,19 +206,6 @@ private:
 };
 
 } // namespace
-
-Feature Surrounded::highest(const dvec3& up) const noexcept {
-    const dvec3(&p)[3] = triangle.corner;
-    const double h[3] = {glm::dot(up, p[0]), glm::dot(up, p[1]), glm::dot(up, p[2])};
-    return static_cast<Feature>(std::max_element(h, h + 3) - h);
-}
-
-Climb Surrounded::climb(Feature from, const dvec3& up) const noexcept {
-    const bool edge = from >= kFirstEdge;
-    const uint32_t first = edge ? from - kFirstEdge : from, second = edge ? (first + 1) % 3 : first;
-    return {hills, rotation != nullptr ? up * *rotation : up, // the transpose times it
-            corners[first], corners[second], hills != nullptr ? kClimbSteps : 0};
-}
 
 TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin, const KnownOverlap& known) noexcept {
     const TrianglePair pair(a.triangle, b.triangle);

@@ -25,4 +25,12 @@ PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose
     return out;
 }
 
+glm::dvec3 face_normal(const PlacedTriangle& t) noexcept {
+    return glm::cross(t.corner[1] - t.corner[0], t.corner[2] - t.corner[0]);
+}
+
+double support(const PlacedTriangle& t, const glm::dvec3& n) noexcept {
+    return std::max({glm::dot(n, t.corner[0]), glm::dot(n, t.corner[1]), glm::dot(n, t.corner[2])});
+}
+
 } // namespace prolate::query

@@ -18,4 +18,9 @@ struct PlacedTriangle {
 PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept;                             // of body A
 PlacedTriangle place(const TreeView& tree, uint32_t triangle, const RelativePose& b_to_a) noexcept; // of body B
 
+/// Of any length; outwards, if the triangle belongs to a closed mesh.
+glm::dvec3 face_normal(const PlacedTriangle& triangle) noexcept;
+/// The greatest n.x of its points x.
+double support(const PlacedTriangle& triangle, const glm::dvec3& n) noexcept;
+
 } // namespace prolate::query

@@ -1,0 +1,34 @@
+// What the last query knew of the contacts of two bodies: ids of points by which they are known again, with their ages
+// and impulses.
+#pragma once
+
+#include "query/ellipsoid/placed.hpp"
+
+#include <prolate/contacts.hpp>
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+
+namespace prolate::query {
+
+class LastContacts {
+public:
+    /// `exchanged`: the caller has the bodies the other way round. `to_world`: from A's frame.
+    LastContacts(const ContactManifolds& last, bool exchanged, const RelativePose& to_world) noexcept;
+
+    uint32_t count() const noexcept { return count_; }
+    /// Of a manifold, in A's frame, from A to B.
+    const glm::dvec3& normal(uint32_t manifold) const noexcept { return normals_[manifold]; }
+    /// Was there a point of this id, and about this normal?
+    bool knows(uint64_t id, const glm::dvec3& normal) const noexcept;
+    /// Gives the points of a new manifold that are known the age and the impulse that they had.
+    void hand_on(Manifold& manifold) const noexcept;
+
+private:
+    const ContactManifolds last_;
+    uint32_t count_;
+    glm::dvec3 normals_[kManifolds];
+};
+
+} // namespace prolate::query
