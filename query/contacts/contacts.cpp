@@ -13,7 +13,6 @@
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
 #include "query/contacts/pair_contacts.hpp"
-#include "query/ellipsoid/convert.hpp"
 
 #include <prolate/contacts.hpp>
 

@@ -1,6 +1,5 @@
 #include "query/contacts/pair_contacts.hpp"
 
-#include "query/ellipsoid/convert.hpp"
 #include "query/ellipsoid/gap.hpp"
 #include "query/triangle/distance.hpp"
 #include "query/triangle/ellipsoid_contact.hpp"

@@ -1,7 +1,6 @@
 // distance(): the query around the traversal (search.cpp). Bodies are taken in their canonical order, and a
 // DistanceCache names the leaves to be looked at first.
 #include "query/distance/search.hpp"
-#include "query/ellipsoid/convert.hpp"
 
 #include <algorithm>
 #include <cmath>

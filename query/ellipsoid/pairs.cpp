@@ -5,8 +5,8 @@
 // center 37 u |c| + 2 u |c'| for a local center c and a world center c' (separation.hpp), the factor, orthogonalised
 // row by row, at most 128 u |L| (29 u of the rotation; the rest is Gram and Schmidt's backward error, generously). All
 // is enlarged by 16 v, for the rounding of what lanes make of it: the sum of two, its products with lengths.
-#include "query/ellipsoid/convert.hpp"
 #include "query/ellipsoid/gap.hpp"
+#include "query/ellipsoid/placed.hpp"
 
 #include <prolate/pairs.hpp>
 

@@ -1,8 +1,5 @@
 #include "query/ellipsoid/placed.hpp"
 
-#include "query/ellipsoid/convert.hpp"
-#include "query/ellipsoid/symmetric.hpp"
-
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
@@ -38,7 +35,9 @@ RelativePose relative_pose(const Pose& a, const Pose& b) noexcept {
     const dmat3 rotation_a = rotation_matrix(a.rotation), rotation_b = rotation_matrix(b.rotation);
     const dvec3 d = to_double(b.translation) - to_double(a.translation);
     RelativePose out{glm::transpose(rotation_a) * rotation_b, d * rotation_a, glm::length(d)};
-    const double sum = trace(out.rotation) + out.translation.x + out.translation.y + out.translation.z + out.distance;
+    const dmat3& r = out.rotation;
+    const double sum =
+        r[0][0] + r[1][1] + r[2][2] + out.translation.x + out.translation.y + out.translation.z + out.distance;
     if (!std::isfinite(sum)) {
         const double nan = std::numeric_limits<double>::quiet_NaN();
         out = {dmat3(dvec3(nan), dvec3(nan), dvec3(nan)), dvec3(nan), nan};

@@ -9,6 +9,13 @@
 
 namespace prolate::query {
 
+inline glm::dvec3 to_double(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+inline Vec3 to_float(const glm::dvec3& v) {
+    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+}
+
 /// Rotation of a quaternion of any length but 0.
 glm::dmat3 rotation_matrix(const Quat& q) noexcept;
 

@@ -30,7 +30,8 @@
 // |n|_1 > 2^-60, which is demanded. Overflow, and NaN from whatever source, fail the comparison and so never separate.
 //
 // Cost: about 140 vector operations and two square roots for eight pairs.
-#include "query/node/place-inl.hpp"
+#include "query/node/block_box-inl.hpp"
+#include "query/node/lanes.hpp"
 
 // clang-format off
 #if defined(PROLATE_QUERY_LANES_INL_HPP) == defined(HWY_TARGET_TOGGLE)

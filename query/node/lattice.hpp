@@ -2,7 +2,7 @@
 // its nodes are the stored integers 0 ... 65535. Steps are powers of two, so lengths change frames without rounding.
 #pragma once
 
-#include "query/ellipsoid/separation.hpp"
+#include "query/ellipsoid/placed.hpp"
 #include "src/power_of_two.hpp"
 
 #include <prolate/tree.hpp>
@@ -20,7 +20,7 @@ struct LatticePose {
     alignas(16) float linear_rounded[3][4]; ///< columns
     float scale;                            ///< step_from / step_to
     /// Bounds every length that entered a coordinate of x_to, in its lattice's steps, for a stored center. Rounding in
-    /// double then costs less than 2^-44 of it (the terms: separation.hpp).
+    /// double then costs less than 2^-44 of it (the terms: query/ellipsoid/separation.hpp).
     double reach;
     int32_t exponent_from; ///< step exponent of the lattice that x_from lies in
 };

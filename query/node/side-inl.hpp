@@ -1,6 +1,6 @@
 // One of the two trees of a traversal, as that whose children are tested, a block at a time, against single nodes of
 // the other. Per SIMD target; include it below hwy/foreach_target.h.
-#include "query/node/lanes-inl.hpp"
+#include "query/node/place-inl.hpp"
 #include "query/node/tree_side.hpp"
 
 // clang-format off

@@ -1,7 +1,7 @@
 #include "query/raycast/ray.hpp"
 
-#include "query/ellipsoid/convert.hpp"
 #include "query/ellipsoid/nearest_direction.hpp"
+#include "query/ellipsoid/placed.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>

@@ -1,5 +1,4 @@
 // raycast() and its kin: the query around the traversal (search.cpp).
-#include "query/ellipsoid/convert.hpp"
 #include "query/raycast/search.hpp"
 
 #include <glm/geometric.hpp>

@@ -1,6 +1,6 @@
 #include "query/shapes/rounded_box.hpp"
 
-#include "query/ellipsoid/convert.hpp"
+#include "query/ellipsoid/placed.hpp"
 #include "query/node/limits.hpp"
 
 #include <glm/geometric.hpp>

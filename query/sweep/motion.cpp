@@ -18,10 +18,6 @@ using glm::dmat3;
 using glm::dvec3;
 using glm::dvec4;
 
-dvec3 to_double(const Vec3& v) {
-    return {v.x, v.y, v.z};
-}
-
 // Rotation of the unit quaternion (v, w).
 dmat3 matrix_of(const dvec4& q) {
     const double x = q.x, y = q.y, z = q.z, w = q.w;

@@ -33,6 +33,7 @@
 #include "query/inside/enclosure.hpp"
 #include "query/node/best_first.hpp"
 #include "query/node/heap.hpp"
+#include "query/node/place-inl.hpp"
 #include "query/sweep/lanes-inl.hpp"
 #include "query/sweep/search.hpp"
 

@@ -1,5 +1,4 @@
 // sweep(): the query around the traversal (search.cpp). Bodies are taken in their canonical order.
-#include "query/ellipsoid/convert.hpp"
 #include "query/sweep/search.hpp"
 
 #include <algorithm>

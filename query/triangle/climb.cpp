@@ -1,6 +1,6 @@
 #include "query/triangle/climb.hpp"
 
-#include "query/ellipsoid/convert.hpp"
+#include "query/ellipsoid/placed.hpp"
 #include "src/block_box.hpp"
 #include "src/bytes.hpp"
 #include "src/power_of_two.hpp"

@@ -1,7 +1,5 @@
 #include "query/triangle/placed.hpp"
 
-#include "query/ellipsoid/convert.hpp"
-
 #include <glm/geometric.hpp>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #include "query/world/reach.hpp"
 
-#include "query/ellipsoid/convert.hpp"
+#include "query/ellipsoid/placed.hpp"
 #include "src/block.hpp"
 #include "src/block_box.hpp"
 #include "src/bytes.hpp"

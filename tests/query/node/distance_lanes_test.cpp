@@ -7,6 +7,7 @@
 #include <hwy/foreach_target.h>
 
 #include "query/node/distance_lanes-inl.hpp"
+#include "query/node/place-inl.hpp"
 
 #include "query/ellipsoid/gap.hpp"
 #include "src/bytes.hpp"
