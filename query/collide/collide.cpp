@@ -37,7 +37,7 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, do
         const glm::dvec3 column = now.rotation[c] - before.rotation[c];
         turned += glm::dot(column, column);
     }
-    // Both placements are rounded, by less than kSeparationMargin of all lengths (separation.hpp).
+    // Both placements are rounded, by less than kSeparationMargin of all lengths (query/ellipsoid/separation.hpp).
     return std::sqrt(turned) * reach_b + glm::length(now.translation - before.translation) +
            query::kSeparationMargin * (2 * reach_b + before.distance + now.distance);
 }

@@ -74,10 +74,10 @@ public:
         return 1;
     }
     // Points nearer to each other are one.
-    double same_point() const { return patches_.apart(); }
+    double same_point() const { return patches_.same_point(); }
 
 private:
-    // A way to take the bodies apart.
+    // A way to separate the bodies.
     struct Way {
         dvec3 normal;
         double depth;

@@ -16,9 +16,9 @@ constexpr double kPreferKnown = 1.1;
 constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
 
 // What is known keeps its place against others that are no better than rounding.
-bool instead(const Candidate& old, const Candidate& other, double ahead, double apart) {
+bool instead(const Candidate& old, const Candidate& other, double ahead, double same_point) {
     if (old.known == other.known) return ahead > 0;
-    return ahead > (other.known ? -apart : apart);
+    return ahead > (other.known ? -same_point : same_point);
 }
 
 } // namespace
@@ -33,7 +33,8 @@ bool Patch::takes(const dvec3& normal) const noexcept {
     return glm::dot(normal, seed_) > kSameNormal;
 }
 
-void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap, double apart) noexcept {
+void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap,
+                double same_point) noexcept {
     sum_ += weight * normal, weight_ += weight;
     overlap_ = std::max(overlap_, overlap);
     const double x = glm::dot(x_, candidate.middle), y = glm::dot(y_, candidate.middle);
@@ -42,7 +43,7 @@ void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, 
                              kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y),
                              kDiagonal * (y - x)};
     for (uint32_t i = 0; i < kSieve; ++i) {
-        const double same = i == 0 ? std::min(apart, kSameDepth * std::abs(candidate.depth)) : apart;
+        const double same = i == 0 ? std::min(same_point, kSameDepth * std::abs(candidate.depth)) : same_point;
         if (any_ && !instead(sieve_[i], candidate, values[i] - reach_[i], same)) continue;
         reach_[i] = values[i], sieve_[i] = candidate;
     }
@@ -58,7 +59,7 @@ bool Patch::mixed() const noexcept {
     return glm::length(sum_) < kAgreeing * weight_;
 }
 
-uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept {
+uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) const noexcept {
     const dvec3 n = normal();
     uint32_t count = 0;
     // Takes the point that `measure` rates best, if above `least`.
@@ -75,13 +76,13 @@ uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const no
     // Of what is as deep as the deepest, the outermost: with equal depths a corner, not what lies between two.
     dvec3 mean(0);
     for (const Candidate& c : sieve_) mean += c.middle / double{kSieve};
-    const double as_deep = sieve_[0].depth - std::min(apart, kSameDepth * std::abs(sieve_[0].depth));
+    const double as_deep = sieve_[0].depth - std::min(same_point, kSameDepth * std::abs(sieve_[0].depth));
     const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
     if (!take(-0.5, outermost)) out[count++] = sieve_[0];
     const dvec3 p = out[0].middle;
-    if (!take(apart, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
+    if (!take(same_point, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
     const dvec3 q = out[1].middle;
-    const double least_area = apart * glm::length(q - p);
+    const double least_area = same_point * glm::length(q - p);
     const auto area = [&](const dvec3& a, const dvec3& b, const dvec3& c) {
         return glm::dot(n, glm::cross(b - a, c - a));
     };
@@ -99,7 +100,7 @@ uint32_t Patch::reduce(double apart, Candidate (&out)[kManifoldPoints]) const no
 void Patches::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept {
     Patch* shallowest = &patches_[0];
     for (uint32_t i = 0; i < count_; ++i) {
-        if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, apart_);
+        if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, same_point_);
         if (patches_[i].depth() < shallowest->depth()) shallowest = &patches_[i];
     }
     if (count_ < kMost)
@@ -107,7 +108,7 @@ void Patches::add(const dvec3& normal, const Candidate& candidate, double weight
     else if (!(candidate.depth > shallowest->depth()))
         return;
     *shallowest = Patch(normal);
-    shallowest->add(normal, candidate, weight, overlap, apart_);
+    shallowest->add(normal, candidate, weight, overlap, same_point_);
 }
 
 } // namespace prolate::query

@@ -35,10 +35,10 @@ public:
     Patch() = default;
 
     bool takes(const glm::dvec3& normal) const noexcept;
-    /// `weight`: of the normal in the mean. `overlap`: what parts the bodies here, along the normal. Points nearer to
-    /// each other than `apart` count as one.
+    /// `weight`: of the normal in the mean. `overlap`: what separates the bodies here, along the normal. Points nearer
+    /// to each other than `same_point` count as one.
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
-             double apart) noexcept;
+             double same_point) noexcept;
     bool empty() const noexcept { return !any_; }
     double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; } ///< of the deepest point
     double overlap() const noexcept { return overlap_; }                      ///< the largest
@@ -48,7 +48,7 @@ public:
     /// Is the mean one of different normals?
     bool mixed() const noexcept;
     /// The best four or fewer. Returns how many.
-    uint32_t reduce(double apart, Candidate (&out)[kManifoldPoints]) const noexcept;
+    uint32_t reduce(double same_point, Candidate (&out)[kManifoldPoints]) const noexcept;
 
 private:
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
@@ -64,13 +64,13 @@ class Patches {
 public:
     static constexpr uint32_t kMost = 8;
 
-    explicit Patches(double apart) : apart_(apart) {}
+    explicit Patches(double same_point) : same_point_(same_point) {}
     /// A patch for points of about this normal, if some come.
     void expect(const glm::dvec3& normal) noexcept {
         if (count_ < kMost) patches_[count_++] = Patch(normal);
     }
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept;
-    double apart() const noexcept { return apart_; }
+    double same_point() const noexcept { return same_point_; }
     /// Calls visit(patch) for those that have points.
     template <class Visit> void for_each(Visit&& visit) const {
         for (uint32_t i = 0; i < count_; ++i)
@@ -78,7 +78,7 @@ public:
     }
 
 private:
-    double apart_;
+    double same_point_;
     Patch patches_[kMost];
     uint32_t count_ = 0;
 };

@@ -102,7 +102,8 @@ double DistanceSearch::gap_along_normal(uint32_t node_a, uint32_t node_b, Triang
 void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,
                                       double bound) noexcept {
     const double limit = enough();
-    if (normal != dvec3(0)) { // almost all leaves are far enough apart along the direction of the nearest ones
+    if (normal !=
+        dvec3(0)) { // almost all leaves are far enough from each other along the direction of the nearest ones
         const double gap = gap_along_normal(node_a, node_b, in_a, in_b);
         if (gap >= limit) {
             skipped = std::min(skipped, std::max(gap, bound));

@@ -137,7 +137,7 @@ private:
         done(false);
     }
 
-    // The pair of the roots; false if they are far enough apart.
+    // The pair of the roots; false if it need not be looked at.
     bool roots(Entry& e) {
         const PlacedNodeWithBox& one = sides_[1].place(sides_[0], 0);
         LaneBounds bounds;

@@ -29,8 +29,8 @@ struct DistanceSearch {
 
     bool complete = false;    ///< no budget ran out
     bool overlapping = false; ///< the witness meets
-    /// Does one body hold a part of the other? Settled before the search, so that no budget that settles more of that
-    /// leaves too little for this.
+    /// Does one body hold a part of the other? Settled before the traversal, so that no budget that settles more of
+    /// that leaves too little for this.
     Verdict enclosure = Verdict::separated;
     /// Of all pairs of leaves: those decided are not nearer than `decided`, those ruled out than `skipped`, and those
     /// still open, when a limit ended the search, than `open`.
@@ -51,7 +51,7 @@ struct DistanceSearch {
         const double improving = upper < kInfinity ? upper - tolerance(upper) : kInfinity;
         return std::max(std::min(options.max_distance, improving), std::numeric_limits<double>::min());
     }
-    /// What bounds around this distance may be apart.
+    /// How far bounds around this distance may be from each other.
     double tolerance(double distance) const {
         return std::max(options.tolerance_absolute, options.tolerance_relative * distance);
     }

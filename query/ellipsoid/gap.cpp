@@ -130,7 +130,7 @@ public:
         }
     }
 
-    // Directions in which deep bodies may part sooner than along the normal of Perram and Wertheim's plane.
+    // Directions in which deep bodies may separate sooner than along the normal of Perram and Wertheim's plane.
     void try_thin_directions() {
         const dmat3 sum = q1_ * (1 / trace(q1_)) + q2_ * (1 / trace(q2_));
         for (const dmat3& q : {q1_, q2_, sum}) {

@@ -3,8 +3,8 @@
 //
 // Gap in direction n, |n| = 1, from body A towards body B, r = c2 - c1:
 //     g(n) = n.r - a(n) - b(n),   a = |L1^T n|, b = |L2^T n|.
-// The signed distance is d = max g: the distance of bodies that are apart; minus the penetration depth (the length of
-// the shortest translation that parts them) of bodies that overlap. What is certified:
+// The signed distance is d = max g: the distance of bodies that are separated; minus the penetration depth (the length
+// of the shortest translation that separates them) of bodies that overlap. What is certified:
 //   lower bound   d >= g(n) for any n, so also for one that is not optimal.
 //   upper bound   x1 = c1 + Q1 n / a and x2 = c2 - Q2 n / b lie on the bodies: d <= |x2 - x1|. (r - Q1 n / a - Q2 n / b
 //                 = x2 - x1 is also the gradient of g; where it is parallel to n both bounds agree.)
@@ -59,15 +59,16 @@ inline constexpr uint32_t kMaxNewtonEvaluations = 32, kMaxGapEvaluations = 160;
 /// `size`; 0 if rounding leaves nothing.
 double least_width(const glm::dmat3& factor, double size) noexcept;
 
-/// Distance, for bodies that are apart; it stops when upper - lower <= tolerance (metres; 0: until rounding stops it).
-/// For bodies that overlap it stops as soon as that shows, and gives a normal to start depth_of() with; bounds hold.
-/// `start_normal`: of an earlier, similar pair; any length, 0 if there is none. Input that is not finite gives
+/// Distance, for bodies that are separated; it stops when upper - lower <= tolerance (metres; 0: until rounding stops
+/// it). For bodies that overlap it stops as soon as that shows, and gives a normal to start depth_of() with; bounds
+/// hold. `start_normal`: of an earlier, similar pair; any length, 0 if there is none. Input that is not finite gives
 /// lower = -infinity, upper = infinity.
 Gap distance_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double tolerance,
                 const glm::dvec3& start_normal = {0, 0, 0}) noexcept;
 
 /// Are two leaves certainly farther apart than `margin` >= 0? All queries of trees decide so on the ellipsoids of two
-/// leaves: placed alike (order.hpp), they get the same answer to the bit. With an infinite or NaN margin, never.
+/// leaves: placed alike (query/node/order.hpp), they get the same answer to the bit. With an infinite or NaN margin,
+/// never.
 bool separated(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin = 0) noexcept;
 
 /// Depth, for bodies that overlap: -lower is the least depth found, with the normal along which B leaves A soonest. It

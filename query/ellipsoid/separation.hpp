@@ -1,4 +1,4 @@
-// Are two ellipsoids apart? The scalar test in double precision: two certificates, one direction at a time.
+// Are two ellipsoids separated? The scalar test in double precision: two certificates, one direction at a time.
 //
 // Source: Perram and Wertheim, "Statistical mechanics of hard ellipsoids", J. Comput. Phys. 58 (1985) 409-416.
 //
@@ -22,9 +22,9 @@
 //   p - a - b            two more roundings, 2 u |n| S
 // so that the computed p - a - b is wrong by at most 83 u |n| S + O(u^2), S = |c1| + |c2| + |d| + |L1| + |L2|.
 // Certificate (1) demands more than kSeparationMargin |n| S, 256 u: the rest pays for the rounding of the bound itself,
-// and leaves room for bodies whose positions are wrong by the 75 u S above (inside.hpp). n is scaled to max-norm 1, so
-// underflow costs at most 2^-536, far below u S for any S a float can make. The world positions t1, t2 enter by their
-// difference only: bodies far from the origin lose nothing.
+// and leaves room for bodies whose positions are wrong by the 75 u S above (query/inside/inside.hpp). n is scaled to
+// max-norm 1, so underflow costs at most 2^-536, far below u S for any S a float can make. The world positions t1, t2
+// enter by their difference only: bodies far from the origin lose nothing.
 //
 // Certificate (2), with Q scaled to trace 1 (units cannot underflow): |dQ| <= 160 u, |d adj| <= 490 u,
 // |dn| <= 570 u S, |d det| <= 653 u, |da| <= 651 u S |L|. It is tightened by kOverlapMargin, 1024 u, times the same.

@@ -2,8 +2,8 @@
 // hwy/foreach_target.h.
 //
 // With the terms of lanes-inl.hpp, the gap g(n) = n.r - |L1^T n| - |L2^T n| along any unit n bounds the distance from
-// below. It is greatest where (Q1 / a + Q2 / b + g I) n = r (gap.hpp); with a and b as for spheres, |L| / sqrt(3), and
-// g = |r| - a - b or 0, that is one solution of a linear system:
+// below. It is greatest where (Q1 / a + Q2 / b + g I) n = r (query/ellipsoid/gap.hpp); with a and b as for spheres, |L|
+// / sqrt(3), and g = |r| - a - b or 0, that is one solution of a linear system:
 //     n = adj(Q) r / |adj(Q) r|,   Q = Q1 / |L1| + Q2 / |L2| + (max(0, sqrt(3) |r| - |L1| - |L2|) / 3) I.
 // For bodies near each other it is the direction of lanes-inl.hpp, for bodies far apart that of r. The best direction
 // would save 4 to 12 % of the tests.
@@ -46,7 +46,7 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
 /// Of each lane: the bound, in steps of the block's lattice, which is that along n, from the single to the lane; not
-/// positive if the nodes are not found apart. Lanes without a node have any.
+/// positive if the nodes are not found separated. Lanes without a node have any.
 struct LaneBounds {
     alignas(64) double lower[kBlockLanes];
     alignas(64) float n[3][kBlockLanes]; ///< of length 1 but for rounding

@@ -1,8 +1,8 @@
 // Hulls of exact trees' inner nodes (src/hull.hpp) along the direction that a lane found: a closer look at a pair of
-// nodes that an ellipsoid, and boxes, could not part. Per SIMD target; include it below hwy/foreach_target.h.
+// nodes that an ellipsoid, and boxes, could not separate. Per SIMD target; include it below hwy/foreach_target.h.
 // The tests have a scalar reference.
 //
-// With the terms of lanes-inl.hpp the nodes are apart if
+// With the terms of lanes-inl.hpp the nodes are separated if
 //     p - A - B > 0,   A = max v.w_i + share |v|, v = L1^T n,   B likewise with v = -L2^T n
 // for what the two hulls reach from their ellipsoids' centers: A <= a and B <= b but for rounding. |w| <= 1, so
 //   A         v is wrong by 14 u |n| |L1| as in a; 3 products and 2 sums, two rounded factors, their products and the

@@ -6,7 +6,7 @@
 // and the ellipsoids are separated by a plane with normal n if
 //     p - a - b > 0,    p = n.r,  a = |L1^T n|,  b = |L2^T n|                                                      (1)
 // for ANY n; (p - a - b) / |n| then bounds their distance from below. One evaluation leaves 8 % of the pairs undecided
-// that a perfect direction would separate; the descent goes on for those.
+// that a perfect direction would separate; the traversal goes on for those.
 //
 // Why single precision suffices. Everything is in the lattice coordinates of the block's tree, where its centers c2 are
 // integers below 2^16, and L2 is what the format says it is, a float each: both exact. u = 2^-24, norms Euclidean or
@@ -80,7 +80,7 @@ HWY_INLINE LaneNodes load_nodes(const std::byte* block, size_t first, int32_t st
     return out;
 }
 
-/// Bit i: the boxes do not tell lane i apart from the single.
+/// Bit i: the boxes do not separate lane i from the single.
 HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float margin) {
 #if HWY_TARGET == HWY_SCALAR
     uint32_t meet = 0;

@@ -44,7 +44,7 @@ template <class Placement> struct OrderedBodies {
     bool exchanged; ///< the caller has them the other way round
 };
 /// All arguments must outlive what it returns. The header of a file, which has hashes of the rest, tells most trees
-/// apart; to read on would take long for copies of one.
+/// from each other; to read on would take long for copies of one.
 template <class Placement>
 OrderedBodies<Placement> in_canonical_order(const TreeView& a, const Placement& place_a, const TreeView& b,
                                             const Placement& place_b) {

@@ -2,10 +2,11 @@
 // the tree.
 //
 // The ray is cut down to the part near the root first, and counted from there (PlacedRay), so that a far origin costs
-// no more than the rounding of its own distance. u = 2^-53, S = all lengths that enter: in the terms of separation.hpp
-// the points of the placed ray are wrong by less than 75 u S (origin) and 34 u S (direction).
+// no more than the rounding of its own distance. u = 2^-53, S = all lengths that enter: in the terms of
+// query/ellipsoid/separation.hpp the points of the placed ray are wrong by less than 75 u S (origin) and 34 u S
+// (direction).
 //
-// Ellipsoid: as in ray_lanes-inl.hpp, (1). n.r, |L^T n| and t n.d add up to 15 u |n| S of rounding, with the ray's own
+// Ellipsoid: as in lanes-inl.hpp, (1). n.r, |L^T n| and t n.d add up to 15 u |n| S of rounding, with the ray's own
 // 124 u |n| S: kSeparationMargin, 256 u, is demanded. Not certainly missed is hit.
 //
 // Triangle: the ray is turned to the z-axis by exchanging coordinates and a shear (Woop, Benthin and Wald 2013,

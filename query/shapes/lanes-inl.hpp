@@ -54,7 +54,7 @@ HWY_INLINE LaneGaps shape_gaps(const LaneNodes& e, const LaneHalfSpace& half_spa
     return {low - (half_space.slack + kLaneMargin * size), low};
 }
 
-/// Bit i: the boxes do not tell lane i apart from the shape.
+/// Bit i: the boxes do not separate lane i from the shape.
 HWY_INLINE uint32_t boxes_meet_shape(const std::byte* block, const LaneRoundedBox& box) {
     return boxes_meet(block, box.single, 0);
 }

@@ -1,7 +1,7 @@
 // A box blown up by a radius: what a sphere, a capsule, a box, and all of them with a margin, are. And a half-space.
-// Are they apart from a triangle or an ellipsoid? Scalar, in double precision, in the tree's frame.
+// Are they separated from a triangle or an ellipsoid? Scalar, in double precision, in the tree's frame.
 //
-// With the box's half edges e_i and radius rho, any direction n certifies that it is apart from a convex body K if
+// With the box's half edges e_i and radius rho, any direction n certifies that it is separated from a convex body K if
 //     min n.(x - c) over K  -  sum |n.e_i|  -  rho |n|  >  0.                                                       (1)
 // n is sought by Gilbert, Johnson and Keerthi's algorithm (1988) for the point v of K - box that is nearest to the
 // origin: n = v. It ends when n certifies, when |v| <= rho, when the difference holds the origin, or when v gains no
@@ -9,10 +9,10 @@
 // touches, v has lost its digits; the directions of the separating axis theorem (Gottschalk, Lin and Manocha 1996) have
 // not.
 //
-// Rounding, in the terms and with the bounds of separation.hpp: the frame is the tree's, so K is exact and the box is
-// body B: |n.(x - c)| is wrong by 81 u |n| S, |L^T n| by 7 u |n| |L|, |n.e_i| by 74 u |n| |e_i|, rho |n| by 4 u, and
-// two sums by 4 u |n| S, S = |x| + |d| + |L| + sum |e_i| + rho: less than 90 u |n| S in all. kSeparationMargin, 256 u,
-// is demanded.
+// Rounding, in the terms and with the bounds of query/ellipsoid/separation.hpp: the frame is the tree's, so K is exact
+// and the box is body B: |n.(x - c)| is wrong by 81 u |n| S, |L^T n| by 7 u |n| |L|, |n.e_i| by 74 u |n| |e_i|, rho |n|
+// by 4 u, and two sums by 4 u |n| S, S = |x| + |d| + |L| + sum |e_i| + rho: less than 90 u |n| S in all.
+// kSeparationMargin, 256 u, is demanded.
 //
 // Half-space: its normal decides alone. The placed normal is wrong by 35 u, its offset by 40 u (|offset| + |t|); with
 // S = |offset| + |t| + |x| + |L|, less than 90 u S again.

@@ -5,7 +5,8 @@
 // temporal culling" (2007), whose bound of the motion along a direction it is, and a second one beside it.
 //
 // X is the body of the block, Y that of the single; n the direction from the single to a lane along which there is a
-// gap (distance_lanes-inl.hpp). A point with the lever r from the point that its body turns about moves along n with
+// gap (query/node/distance_lanes-inl.hpp). A point with the lever r from the point that its body turns about moves
+// along n with
 //     n.(v + w x r) = n.v + m.r,   m = n x w,
 // and this changes by at most |m| |w| |r| in unit time, for |r|, v, w and n stay. So the gap closes in time t by no
 // more than rate t + curve t^2 / 2, where

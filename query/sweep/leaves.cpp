@@ -33,8 +33,8 @@ constexpr double kTolerance = 1e-4; // of the smaller body, if none is given
 // - lower and the rounding. With S all lengths that enter, pieces whose edges are nearly parallel (slivers, and boxes
 // side by side) have upper - lower of up to sqrt(u) S / 4, u = 2^-53, 2.6e-9 S: closest points of two edges are found
 // by a quotient of a / sin^2 of their angle, whose error u S / sin^2 moves them along the edges by that much, and apart
-// by sin of the angle times as much, or the whole edge's: worst where sin^2 = u. (2e-9 S was the most in
-// triangle_distance_ test's; ellipsoids: 1e-9 of their sizes.) So 2^-27 S is enough, 7.5e-9 S; taken as 2^-24 of both
+// by sin of the angle times as much, or the whole edge's: worst where sin^2 = u. (The tests find at most
+// 2e-9 S for triangles, and 1e-9 of their sizes for ellipsoids.) So 2^-27 S is enough, 7.5e-9 S; taken as 2^-24 of both
 // sizes for pieces near their bodies' origins, and 2^-27 of the lengths for those that are not. Motion that turns far
 // rounds more (motion.hpp).
 constexpr double kLeastOfSizes = 0x1p-24, kLeastOfLengths = 0x1p-27, kLeastOfTurns = 0x1p-38;

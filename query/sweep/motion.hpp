@@ -4,7 +4,7 @@
 // multiple of pi / 2 (of which a number of 33 bits and the rest are taken off, after Cody and Waite 1980), then
 // Taylor's series; wrong by at most 2 u, u = 2^-53, for arguments up to kMaxTurn.
 //
-// Rounding, in the terms of separation.hpp; theta = t |angular| for a body, the angle it has turned by.
+// Rounding, in the terms of query/ellipsoid/separation.hpp; theta = t |angular| for a body, the angle it has turned by.
 //   turn        of half the angle: |angular| is wrong by 3 u of itself, so the quaternion by at most (10 + 2 theta) u,
 //               the matrix by (60 + 6 theta) u
 //   R(t)        turn times the starting rotation, 29 u:                    |dR| <= (100 + 6 theta) u

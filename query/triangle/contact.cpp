@@ -226,7 +226,7 @@ TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin,
     }
     out.faces = axis.kind != Axis::Kind::edges;
     if (out.count > 0) return out;
-    // Beside each other: the closest points, if they are apart.
+    // Beside each other: the closest points, if they are separated.
     const TriangleDistance nearest = distance(a.triangle, b.triangle);
     const dvec3 between = nearest.on_b - nearest.on_a;
     const double length = glm::length(between);

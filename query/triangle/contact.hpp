@@ -1,4 +1,4 @@
-// How do two triangles that meet, or nearly do, touch, and how can their bodies be taken apart? For contacts; scalar,
+// How do two triangles that meet, or nearly do, touch, and how can their bodies be separated? For contacts; scalar,
 // in double precision.
 //
 // The normal is one of the separating axis theorem (Gottschalk, Lin and Manocha 1996): a face's, or the product of two
@@ -7,19 +7,19 @@
 // mistaken for one that the body stands beside.
 //
 // Of these it is the one along which the triangles' *surroundings* overlap least. Two triangles alone often overlap
-// least in a direction in which their bodies do not part at all: a corner of a flat floor's triangle that stands into
-// the side of a box is soon out of it sideways, and the floor goes on. A direction is a normal of an edge or a vertex
-// only if the surface does not rise from it along the direction: if it lies in the feature's normal cone, or Voronoi
-// region, as Bullet's internal edge utility (btGenerateInternalEdgeInfo) and Jolt's active edges ask of precomputed
-// neighbours. Here what rises is climbed (climb.hpp), and the overlap counts from the top: so no threshold tells flat
-// from convex, vertices that are coplanar but for rounding do no harm, and finely meshed bodies, of which only a ring
-// of triangles meets a face, overlap it by their depth. A face's own plane is not climbed from: in a hollow,
-// everything around is higher, and its faces bear all the same.
+// least in a direction in which their bodies do not separate at all: a corner of a flat floor's triangle that stands
+// into the side of a box is soon out of it sideways, and the floor goes on. A direction is a normal of an edge or a
+// vertex only if the surface does not rise from it along the direction: if it lies in the feature's normal cone, or
+// Voronoi region, as Bullet's internal edge utility (btGenerateInternalEdgeInfo) and Jolt's active edges ask of
+// precomputed neighbours. Here what rises is climbed (climb.hpp), and the overlap counts from the top: so no threshold
+// tells flat from convex, vertices that are coplanar but for rounding do no harm, and finely meshed bodies, of which
+// only a ring of triangles meets a face, overlap it by their depth. A face's own plane is not climbed from: in a
+// hollow, everything around is higher, and its faces bear all the same.
 //
 // The points are the corners of what one triangle covers of the other, seen along the normal: the other is cut with the
 // sides of the one whose normal it is (Sutherland and Hodgman 1974). Each corner is a vertex of the one or of the
 // other, or a crossing of edges: which, its feature says, and does not change while the triangles slide. Two edges that
-// touch along their product have one point. Triangles that are apart, and cover nothing of each other, have their
+// touch along their product have one point. Triangles that are separated, and cover nothing of each other, have their
 // closest points.
 //
 // Nothing here is certified: a wrong digit moves a contact.

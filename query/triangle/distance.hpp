@@ -7,13 +7,14 @@
 //
 // Upper bound: any two points of the triangles, taken as convex combinations of the computed corners, so that an
 // inexact weight costs tightness only. Each is wrong by what the corners are, 75 u |b| + 37 u |d| or nothing
-// (separation.hpp), plus 4 u for the corner relative to A's first, of up to 2 S, and 12 u S for the combination: with
-// the difference and its norm less than 110 u S. Lower bound: gap(n) / |n| of any direction n, wrong by 91 u S
-// (triangle.hpp) and 2 u S for the norm and the division. kSeparationMargin, 256 u S, is added and taken off.
+// (query/ellipsoid/separation.hpp), plus 4 u for the corner relative to A's first, of up to 2 S, and 12 u S for the
+// combination: with the difference and its norm less than 110 u S. Lower bound: gap(n) / |n| of any direction n, wrong
+// by 91 u S (separation.hpp) and 2 u S for the norm and the division. kSeparationMargin, 256 u S, is added and taken
+// off.
 //
 // Cost: half of all pairs end after a few edges. The rest, among them all that meet, takes all 26 directions of
-// triangle.hpp. In the tests the bounds are at most 2e-9 S apart. So much only where the triangles are nearer than 1e-7
-// S: there the direction from one closest point to the other has lost its digits.
+// separation.hpp. In the tests the bounds are at most 2e-9 S apart. So much only where the triangles are nearer than
+// 1e-7 S: there the direction from one closest point to the other has lost its digits.
 #pragma once
 
 #include "query/triangle/separation.hpp"

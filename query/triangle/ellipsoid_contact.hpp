@@ -1,4 +1,4 @@
-// How a triangle and an ellipsoid that meet, or nearly do, touch, and how their bodies can be taken apart. For
+// How a triangle and an ellipsoid that meet, or nearly do, touch, and how their bodies can be separated. For
 // contacts; scalar, in double precision. As of two triangles (contact.hpp), the normal is the one along which the
 // surroundings overlap least, and nothing is certified.
 #pragma once
@@ -10,11 +10,11 @@ namespace prolate::query {
 struct EllipsoidContact {
     glm::dvec3 normal;    ///< of length 1, from the triangle to the ellipsoid
     glm::dvec3 middle;    ///< between the surfaces, in A's frame
-    double depth;         ///< of the ellipsoid in the triangle's body along the normal; negative: apart
+    double depth;         ///< of the ellipsoid in the triangle's body along the normal; negative: the gap
     bool of_face = false; ///< the normal is the triangle's own
 };
 /// The contact along least overlap: along the normal of the face, or away from the nearest points of the edges, unless
-/// the surface goes on there. If they are apart, that of the nearest points.
+/// the surface goes on there. If they are separated, that of the nearest points.
 EllipsoidContact contact(const Surrounded& around, const PlacedEllipsoid& ellipsoid) noexcept;
 
 /// The contact along a given normal.

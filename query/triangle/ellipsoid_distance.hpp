@@ -6,8 +6,8 @@
 // of a point by query/ellipsoid/nearest_direction.hpp.
 //
 // Upper bound: the distance of any point of the triangle and any of the ellipsoid. Lower bound: the gap along any
-// direction. Both are wrong by at most 100 u S, by the terms of gap.hpp and triangle.hpp; kSeparationMargin S, 256 u S,
-// is added and taken off. So inexact points and directions cost tightness only.
+// direction. Both are wrong by at most 100 u S, by the terms of query/ellipsoid/gap.hpp and separation.hpp;
+// kSeparationMargin S, 256 u S, is added and taken off. So inexact points and directions cost tightness only.
 //
 // Cost: 1 to 40 evaluations of about 300 flops; a tree with triangles against one without is rare.
 #pragma once

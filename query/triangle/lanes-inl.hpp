@@ -1,4 +1,4 @@
-// Eight pairs of triangles at once, in float: apart, meeting, or not known. Compiled once an instruction set.
+// Eight pairs of triangles at once, in float: separated, meeting, or not known. Compiled once an instruction set.
 //
 // Sources: separating axes (Gottschalk, Lin and Manocha 1996); which two products of edges can separate triangles that
 // cross each other's planes, and the signs that prove that they meet: Guigue and Devillers, "Fast and robust
@@ -20,13 +20,14 @@
 //   B's, from its first corner               u |w|, and |w| <= 2 sqrt(3) R, for both its ends lie in the cube of R
 //        turned                              5 u |w| in all, the rounded matrix and 3 products and 2 sums included
 //        moved, by a rounded shift           2 u R
-//        which was computed in double        80 * 2^-53 S, as in triangle.hpp
+//        which was computed in double        80 * 2^-53 S, as in separation.hpp
 //   e <= 20 u R + 80 * 2^-53 S; kPlacementError is 24 u.
 //   differences of corners       2 u R each, and n.(...) of one 6 u |n|_1 R more: 8 u |n|_1 R
 //   gap, of two such and e       (8 + 8 + 2) u |n|_1 R + 2 e |n|_1 <= (58 u R + 160 * 2^-53 S) |n|_1
 // LaneMarginFactors::direction, 64 u, and kSeparationMargin S are demanded, and kProductUnderflow: numbers below 2^-126
-// may have been lost. As |n| <= |n|_1, what is found apart here is apart by more than 90 * 2^-53 S, as inside.hpp wants
-// it. Volumes: L bounds the coordinates of all edges and of B's corners from A's first, as computed.
+// may have been lost. As |n| <= |n|_1, what is found separated here is so by more than 90 * 2^-53 S, as
+// query/inside/inside.hpp wants it. Volumes: L bounds the coordinates of all edges and of B's corners from A's first,
+// as computed.
 //   n = c x g                    8 u L^2 a coordinate, |n_k| <= 2 L^2
 //   n.x - n.y                    48 u L^3 for n, 12 u L^3 for x and y, 36 u L^3 for the products and sums, 12 u L^3 for
 //                                the difference: 108 u L^3; and 60 e L^2 for e (2 e an edge or difference)

@@ -1,5 +1,5 @@
 // Two leaves of exact trees: does a triangle of one meet a triangle of the other, and how far are they apart? Float
-// kernels answer for eight pairs at once; what they leave open the scalar tests of triangle.hpp and
+// kernels answer for eight pairs at once; what they leave open the scalar tests of separation.hpp and
 // distance.hpp decide.
 #pragma once
 

@@ -13,11 +13,11 @@
 // and an ellipsoid: seen from the ellipsoid as the unit ball, the triangle's normal and the points of its edges closest
 // to the center, one of which is the direction of the distance.
 //
-// Rounding, in the terms and with the bounds of separation.hpp: |b_j| is wrong by 75 u |b_j| + 37 u |d|, n.(b_j - a_0)
-// by 81 u |n| S, n.(a_i - a_0) by 8 u |n| S, and their difference by 91 u |n| S, S = max |a_i| + max |b_j| + |d|. For
-// the ellipsoid, n.(a_i - c) and |L^T n| add up to 83 u |n| S. kSeparationMargin, 256 u, is demanded of both; so
-// computed corners are separated too, by more than 90 u S, which the point-in-solid test builds on. What is not found
-// separated is nearer than 1e-13 S in the tests' pairs, needles and slivers among them.
+// Rounding, in the terms and with the bounds of query/ellipsoid/separation.hpp: |b_j| is wrong by 75 u |b_j| + 37 u
+// |d|, n.(b_j - a_0) by 81 u |n| S, n.(a_i - a_0) by 8 u |n| S, and their difference by 91 u |n| S, S = max |a_i| + max
+// |b_j| + |d|. For the ellipsoid, n.(a_i - c) and |L^T n| add up to 83 u |n| S. kSeparationMargin, 256 u, is demanded
+// of both; so computed corners are separated too, by more than 90 u S, which the point-in-solid test builds on. What is
+// not found separated is nearer than 1e-13 S in the tests' pairs, needles and slivers among them.
 //
 // Cost: 2 to 26 directions of about 40 flops; most pairs need one or two.
 #pragma once

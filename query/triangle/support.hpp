@@ -1,9 +1,9 @@
 // How far the triangles of a leaf reach along a direction, in double precision: the cheapest way to tell that two
-// leaves are apart, if one knows along which direction to look.
+// leaves are separated, if one knows along which direction to look.
 //
 // With n from A to B, of length 1 but for rounding, the triangles are apart by at least
 //     n.t - support(A, n) - support(B, -R^T n),     x_A = R x_B + t.
-// The terms of its error are those of triangle.hpp: there B's corners are turned, here the direction, with the same
+// The terms of its error are those of separation.hpp: there B's corners are turned, here the direction, with the same
 // error, so kSeparationMargin S pays for it; S = triangle_reach(A) + triangle_reach(B) + |t|.
 #pragma once
 

@@ -4,7 +4,8 @@
 // box in the tree's frame, |y| <= |h|, moves along an axis by at most that of R o + t, plus |R' - R| |h|. So a box
 // needs not be computed again while that is less than the room around it.
 //
-// Rounding, in the terms and with the bounds of separation.hpp, body A being the world (identity, so T = R). u = 2^-53.
+// Rounding, in the terms and with the bounds of query/ellipsoid/separation.hpp, body A being the world (identity, so T
+// = R). u = 2^-53.
 //   box         t: 37 u |d|; its sum with what reach() says, and with the margin: 2 u (|d| + S + margin), of which the
 //               part of S is paid by reach() and kSeparationMargin (|d| + margin), 256 u, is added
 //   motion      of R o + t 75 u |o| + 37 u |d| for each pose, |R' - R| 136 u and its own rounding 4 u |R' - R|, at most

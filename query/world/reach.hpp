@@ -10,9 +10,9 @@
 // search, and costs no more than that. Where boxes hold no more than a node's own (nested_boxes()), all leaves are
 // asked.
 //
-// Rounding, in the terms and with the bounds of separation.hpp, body A being the world (identity, so T = R, whose rows
-// are the world's axes). u = 2^-53, norms of rows are 1; c and L are an ellipsoid's, b and h the center and half of a
-// box, w <= 1 a hull's point, p a corner:
+// Rounding, in the terms and with the bounds of query/ellipsoid/separation.hpp, body A being the world (identity, so T
+// = R, whose rows are the world's axes). u = 2^-53, norms of rows are 1; c and L are an ellipsoid's, b and h the center
+// and half of a box, w <= 1 a hull's point, p a corner:
 //   ellipsoid   r.c 75 u |c|, L^T r 74 u |L|, its norm 4 u more, their sum 2 u (|c| + |L|)
 //   hull        v = L^T r as before, v.w 3 products and 2 sums, share |v|: 84 u |L| in all; r.c as before
 //   box         r.b 75 u |b|, |r|.h 75 u |h|; their sum 2 u more

@@ -1,4 +1,4 @@
-// What a World is made of. world.cpp keeps the bodies and their boxes, world_pairs.cpp the list of pairs.
+// What a World is made of. world.cpp keeps the bodies and their boxes, pairs.cpp the list of pairs.
 //
 // Every body is either a leaf of the tree or, if it has no finite box, in the list of unbounded ones. What all pairs
 // are asked about is kept apart, in few bytes a body: the lists of pairs jump about in it.

@@ -11,6 +11,9 @@ set(scratch ${CMAKE_CURRENT_BINARY_DIR}/scratch)
 # Includes.
 script_test(project.layering layering.cmake -D ROOT=${PROJECT_SOURCE_DIR})
 script_test(project.layering_selftest layering_selftest.cmake -D ROOT=${PROJECT_SOURCE_DIR} -D WORK=${scratch}/layering)
+script_test(project.include_graph include_graph.cmake -D ROOT=${PROJECT_SOURCE_DIR})
+script_test(project.include_graph_selftest include_graph_selftest.cmake -D ROOT=${PROJECT_SOURCE_DIR}
+  -D WORK=${scratch}/include_graph)
 
 # Links.
 include(project/links.cmake)

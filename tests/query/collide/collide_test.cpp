@@ -135,7 +135,7 @@ TEST(Collide, TheCheckAboveNoticesTreesThatDoNotCover) {
     EXPECT_GT(false_separations(zoo(0.7), 5), 0u);
 }
 
-// The descent as query/collide/collide.cpp's header words it, recursive and in the opposite order, on single-pair
+// The traversal as query/collide/search.cpp's header words it, recursive and in the opposite order, on single-pair
 // tests.
 class BruteForce {
 public:
