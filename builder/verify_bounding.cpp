@@ -14,9 +14,9 @@ namespace {
 
 // Does a node's box, as queries take it, hold an ellipsoid? Its sides are exact in double; extents round by 4 u.
 bool box_holds(const TreeView& tree, uint32_t node, const Ellipsoid& e) {
-    const BlockBoxes boxes(tree.bounding_block(node / kBlockLanes));
+    const BlockBoxes boxes(tree.raw().bounding_block(node / kBlockLanes));
     const uint32_t lane = node % kBlockLanes;
-    const LatticeInfo lattice = tree.lattice();
+    const LatticeInfo lattice = tree.raw().lattice();
     const double step = power_of_two(lattice.step_exponent), center[3] = {e.center.x, e.center.y, e.center.z};
     const double half[3] = {e.l11, std::hypot(e.l21, e.l22), std::hypot(e.l31, e.l32, e.l33)};
     for (size_t i = 0; i < 3; ++i) {

@@ -87,7 +87,7 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         fits[n] = Fit(ellipsoids[n]);
         largest[n] = 1 - kRounding * fits[n].factor.norm() * fits[n].inverse.norm();
         if (children.count == 0) return;
-        hulls[n].emplace(tree.hull(children.first / kBlockLanes));
+        hulls[n].emplace(tree.raw().hull(children.first / kBlockLanes));
         if (hulls[n]->share == 0) hulls[n].reset(); // it says nothing
         if (const Vec3 c = ellipsoids[n].center; hulls[n] && !in_hull(*hulls[n], Vec::Zero()))
             doubts[n].set(c.x, c.y, c.z);

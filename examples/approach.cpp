@@ -5,6 +5,7 @@
 #include <prolate/collide.hpp>
 
 #include <cstdio>
+#include <memory>
 
 namespace {
 
@@ -28,7 +29,7 @@ int main(int argc, char** argv) {
     const prolate::Ellipsoid root_a = a->view().ellipsoid(0), root_b = b->view().ellipsoid(0);
     const float start = 2 * (root_a.l11 + root_b.l11);
 
-    prolate::QueryContext context;
+    const auto context = std::make_unique<prolate::QueryContext>();
     prolate::Pose pose; // of B; the rotation stays the identity
     prolate::Verdict before = prolate::Verdict::undecided;
     unsigned long long pair_tests = 0, most = 0, separated = 0;
@@ -36,7 +37,7 @@ int main(int argc, char** argv) {
         const float apart = start * static_cast<float>(kSteps - 1 - step) / (kSteps - 1);
         pose.translation = {root_a.center.x - root_b.center.x + apart, root_a.center.y - root_b.center.y,
                             root_a.center.z - root_b.center.z};
-        const auto result = prolate::collide(a->view(), {}, b->view(), pose, context);
+        const auto result = prolate::collide(a->view(), {}, b->view(), pose, *context);
         const unsigned long long tests = result.stats.pair_tests;
         if (step == 0 || result.verdict != before)
             std::printf("pose %3d of %d, centers %8.4f apart: %-11s (%llu pair tests)\n", step + 1, kSteps,

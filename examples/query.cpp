@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 
 int main(int argc, char** argv) {
     if (argc != 4) return std::fputs("usage: query A.etree B.etree X\n", stderr), 2;
@@ -11,8 +12,8 @@ int main(int argc, char** argv) {
         if (!*tree) return std::fprintf(stderr, "query: %s\n", tree->error().what), 1;
 
     const prolate::Pose pose_a, pose_b{{std::strtof(argv[3], nullptr), 0, 0}, {0, 0, 0, 1}};
-    prolate::QueryContext context; // scratch: keep it, and queries never allocate
-    const auto result = prolate::collide(a->view(), pose_a, b->view(), pose_b, context);
+    const auto context = std::make_unique<prolate::QueryContext>(); // 80 KiB of scratch: keep it for all queries
+    const auto result = prolate::collide(a->view(), pose_a, b->view(), pose_b, *context);
 
     const char* const words[] = {"separated", "overlapping", "undecided"};
     std::printf("%s after %llu pair tests\n", words[static_cast<int>(result.verdict)],

@@ -317,12 +317,12 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
 
     TreeView view;
     view.bytes_ = bytes;
-    view.blocks_ = h + first_block;
+    view.raw_.blocks_ = h + first_block;
     view.level_count_ = level_count; // for a look beyond the bytes, at the table
     view.is_prefix_ = bytes.size() < total;
-    for (size_t i = 0; i < 3; ++i) view.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
-    view.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
-    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, view.lattice_.step_exponent);
+    for (size_t i = 0; i < 3; ++i) view.raw_.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
+    view.raw_.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
+    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, view.raw_.lattice_.step_exponent);
     for (uint32_t l = 0; l < present; ++l) {
         const LevelInfo level = view.level(l);
         view.node_count_ += level.node_count;
@@ -352,9 +352,9 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.level_count_ = present;
     view.root_ = view.ellipsoid(0);
     if (!exact) {
-        view.bounding_blocks_ = h + bounding;
-        view.bounding_count_ = view.first_slot(present - 1) / kBlockLanes;
-        for (uint32_t b = 0; b < view.bounding_count_; ++b)
+        view.raw_.bounding_blocks_ = h + bounding;
+        view.raw_.bounding_count_ = view.first_slot(present - 1) / kBlockLanes;
+        for (uint32_t b = 0; b < view.raw_.bounding_count_; ++b)
             if (const auto sound = check.bounding_block(b, bounding + size_t{b} * kBlockBytes); !sound)
                 return sound.error();
     }
@@ -371,9 +371,9 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     for (size_t at = hulls; at < hash; at += kHullBytes)
         if (const size_t found = first_nonzero(h, at + kHullReserved, at + kHullBytes); found < at + kHullBytes)
             return bad("reserved bytes are not zero", found);
-    view.hulls_ = h + hulls;
-    view.vertices_ = h + vertices;
-    view.triangles_ = view.vertices_ + size_t{vertex_count} * kVertexBytes;
+    view.raw_.hulls_ = h + hulls;
+    view.raw_.vertices_ = h + vertices;
+    view.raw_.triangles_ = view.raw_.vertices_ + size_t{vertex_count} * kVertexBytes;
     view.vertex_count_ = vertex_count;
     view.triangle_count_ = triangle_count;
     view.component_count_ = load_le<uint32_t>(h + kAtComponentCount);
@@ -388,7 +388,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
         for (const uint32_t corner : view.triangle(t))
             if (corner >= vertex_count)
                 return bad("a triangle names a vertex that does not exist",
-                           static_cast<size_t>(view.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count));
+                           static_cast<size_t>(view.raw_.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count));
     return view;
 }
 

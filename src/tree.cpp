@@ -17,7 +17,7 @@ struct Place {
 };
 Place place_of(const TreeView& tree, uint32_t slot) {
     assert(slot < tree.slot_count());
-    return {tree.block(slot / kBlockLanes), slot % kBlockLanes};
+    return {tree.raw().block(slot / kBlockLanes), slot % kBlockLanes};
 }
 
 } // namespace
@@ -52,7 +52,7 @@ LevelInfo TreeView::level(uint32_t l) const noexcept {
     level.end_byte = load_le<uint64_t>(row + kLevelEndByte);
     // As numbers, since open() asks for levels that a prefix does not hold.
     const uint64_t begin =
-        static_cast<uint64_t>(blocks_ - bytes_.data()) + uint64_t{level.first_slot / kBlockLanes} * kBlockBytes;
+        static_cast<uint64_t>(raw_.blocks_ - bytes_.data()) + uint64_t{level.first_slot / kBlockLanes} * kBlockBytes;
     level.block_count = static_cast<uint32_t>((level.end_byte - begin) / kBlockBytes);
     level.union_volume = load_le<double>(row + kLevelUnionVolume);
     for (size_t i = 0; i < std::size(kFigures); ++i)
@@ -114,12 +114,12 @@ Ellipsoid ellipsoid_at(const std::byte* from, size_t lane, const LatticeInfo& la
 Ellipsoid TreeView::ellipsoid(uint32_t node) const noexcept {
     assert(is_node(node));
     const auto [from, lane] = place_of(*this, node);
-    return ellipsoid_at(from, lane, lattice_);
+    return ellipsoid_at(from, lane, raw_.lattice_);
 }
 
 Ellipsoid TreeView::bound(uint32_t node) const noexcept {
     assert(is_node(node));
-    return ellipsoid_at(bounding_block(node / kBlockLanes), node % kBlockLanes, lattice_);
+    return ellipsoid_at(raw_.bounding_block(node / kBlockLanes), node % kBlockLanes, raw_.lattice_);
 }
 
 ChildRange TreeView::children(uint32_t node) const noexcept {
@@ -141,16 +141,16 @@ TriangleRange TreeView::triangles(uint32_t node) const noexcept {
 Triangle TreeView::triangle(uint32_t t) const noexcept {
     assert(t < triangle_count_);
     if (index_bytes(vertex_count_) == 2) {
-        const std::byte* const from = triangles_ + size_t{t} * 6;
+        const std::byte* const from = raw_.triangles_ + size_t{t} * 6;
         return {load_le<uint16_t>(from), load_le<uint16_t>(from + 2), load_le<uint16_t>(from + 4)};
     }
-    const std::byte* const from = triangles_ + size_t{t} * 12;
+    const std::byte* const from = raw_.triangles_ + size_t{t} * 12;
     return {load_le<uint32_t>(from), load_le<uint32_t>(from + 4), load_le<uint32_t>(from + 8)};
 }
 
 Vec3 TreeView::vertex(uint32_t v) const noexcept {
     assert(v < vertex_count_);
-    const std::byte* const from = vertices_ + size_t{v} * kVertexBytes;
+    const std::byte* const from = raw_.vertices_ + size_t{v} * kVertexBytes;
     return {load_le<float>(from), load_le<float>(from + 4), load_le<float>(from + 8)};
 }
 

@@ -2,7 +2,7 @@
 // a ray have the precision that its size calls for, wherever the model stands.
 #include "cli/render/scene_cut.hpp"
 
-#include <prolate/raycast.hpp>
+#include <prolate/tools.hpp>
 
 #include <algorithm>
 #include <array>

@@ -7,7 +7,7 @@
 #include "cli/render/scene_mesh.hpp"
 #include "cli/render/solid.hpp"
 
-#include <prolate/raycast.hpp>
+#include <prolate/tools.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -36,6 +36,7 @@ struct PairCache {
     float distance = 0;                   ///< if separated: certified lower bound at the poses below, metres
     Pose pose_a, pose_b;                  ///< where the bodies were
 };
+static_assert(sizeof(PairCache) == 80);
 
 /// Do `a` at `pose_a` and `b` at `pose_b` meet, or come as near as options.margin? Stops at the first pair of leaves,
 /// or of their triangles, that do. Symmetric: swapping the bodies gives the same verdict. Thread-safe on shared trees.

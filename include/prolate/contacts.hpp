@@ -41,6 +41,7 @@ struct ContactManifolds {
     uint32_t count = 0;
     Manifold manifolds[kManifolds]; ///< the deepest first
 };
+static_assert(sizeof(ContactManifolds) <= 968); // less where 8-byte integers are aligned to 4
 
 /// Answer of contacts().
 struct ContactResult {

@@ -36,6 +36,7 @@ struct DistanceCache {
     bool valid = false;
     MeetingPair pair;
 };
+static_assert(sizeof(DistanceCache) == 20);
 
 /// Answer of distance().
 struct DistanceResult {

@@ -10,7 +10,7 @@ namespace prolate {
 
 /// What went wrong. Values are stable and never reused.
 enum class ErrorCode : uint8_t {
-    bad_options = 1,   ///< an option is out of its range
+    bad_options = 1,   ///< an option or argument is out of its range
     bad_mesh = 2,      ///< the mesh cannot be baked (no triangles, indices out of range, not finite, no extent)
     bad_file = 3,      ///< bytes that are not a sound .etree or mesh file, or an .etree of an older format version
     newer_version = 4, ///< an .etree of a later format version than this library reads

@@ -70,7 +70,8 @@ struct QueryStats {
 
 inline constexpr uint32_t kNoTriangle = UINT32_MAX;
 
-/// Scratch of a query, owned by the caller, reusable for any number of queries of any kind. Needs no initialisation.
+/// Scratch of a query, owned by the caller: 80 KiB, so rather on the heap than on a thread's stack. Reusable for any
+/// number of queries of any kind, by one query at a time. Needs no initialisation.
 struct QueryContext {
     /// A pair of nodes still to be looked at. What the last two mean is up to the query.
     struct Entry {
@@ -81,5 +82,6 @@ struct QueryContext {
     static constexpr size_t kEntries = 5120;
     alignas(64) Entry entries[kEntries];
 };
+static_assert(sizeof(QueryContext) == 80 * 1024);
 
 } // namespace prolate

@@ -16,7 +16,6 @@
 
 #include <cstdint>
 #include <limits>
-#include <span>
 
 namespace prolate {
 
@@ -60,18 +59,5 @@ RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, Qu
 /// raycast().
 RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
                           const QueryOptions& options = {}) noexcept;
-
-/// For pictures of a tree: the first hit with the ellipsoids of the cut at options.max_level as they are, also where
-/// they stick out of the nodes above them, and of an exact tree, too. `growth` comes from node_growth().
-RaycastResult raycast_cut(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
-                          QueryContext& context, const QueryOptions& options = {}) noexcept;
-
-/// The same, but stops at any hit, as raycast_any() does.
-RaycastResult raycast_cut_any(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
-                              QueryContext& context, const QueryOptions& options = {}) noexcept;
-
-/// growth[node]: the factor by which a node must grow about its center to hold all nodes below it, at least 1. For all
-/// slots: growth has tree.slot_count() elements. Takes some microseconds a node.
-void node_growth(const TreeView& tree, std::span<float> growth) noexcept;
 
 } // namespace prolate

@@ -1,4 +1,4 @@
-// A world of many bodies: which of them may touch, and do they; and one pair of bodies at many poses.
+// A world of many bodies: which of them may touch, and do they?
 //
 // A World is a broadphase, in the way of Box2D's and Bullet's: each body has a box, somewhat larger than it need be, so
 // that small moves change nothing, and a dynamic tree of these boxes (query/world/bounds_tree.hpp has the sources)
@@ -161,13 +161,5 @@ private:
 
     std::unique_ptr<State, Deleter> state_;
 };
-
-/// collide() of `a` at poses_a[i] and `b` at poses_b[i], for all i; out[i] is the answer. A span of one pose stands for
-/// that pose at all i. Each worker uses the context of its number. Fails with bad_options if the lengths do not fit:
-/// `out` has as many as the longer span, `contexts` at least jobs.workers. Thread-safe, allocates nothing.
-Result<void> collide_poses(const TreeView& a, std::span<const Pose> poses_a, const TreeView& b,
-                           std::span<const Pose> poses_b, std::span<CollideResult> out,
-                           std::span<QueryContext> contexts, const Jobs& jobs = {},
-                           const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

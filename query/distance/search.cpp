@@ -46,7 +46,7 @@ namespace {
 struct DistanceSide : Side<PlacedNodeWithBox> {
     DistanceSide(const TreeSide& side, const LatticePose& other_to_here)
         : Side(side, other_to_here), step(power_of_two(lattice.step_exponent)),
-          per_step(power_of_two(-lattice.step_exponent)), triangles(tree.triangle_bytes()),
+          per_step(power_of_two(-lattice.step_exponent)), triangles(tree.raw().triangles()),
           triangle_bytes(static_cast<uint32_t>(3 * index_bytes(tree.vertex_count()))) {
         std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);
     }

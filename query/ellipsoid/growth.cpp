@@ -12,7 +12,7 @@
 #include "query/ellipsoid/separation.hpp"
 #include "query/ellipsoid/symmetric.hpp"
 
-#include <prolate/raycast.hpp>
+#include <prolate/tools.hpp>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>

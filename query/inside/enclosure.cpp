@@ -31,9 +31,9 @@ private:
     bool a_sample_is_outside() const {
         constexpr uint32_t kSamples = 8;
         if (inner_.component_count() != 1) return false;
-        const LatticeInfo lattice = outer_.lattice();
+        const LatticeInfo lattice = outer_.raw().lattice();
         const double step = power_of_two(lattice.step_exponent);
-        const BlockBoxes boxes(outer_.block(0));
+        const BlockBoxes boxes(outer_.raw().block(0));
         glm::dvec3 low, high; // metres, exact
         for (size_t i = 0; i < 3; ++i) {
             const double origin = static_cast<double>(lattice.origin[i]) + boxes.origin(i), box_step = boxes.step(i);

@@ -23,8 +23,8 @@ namespace {
 class WindingTraversal {
 public:
     WindingTraversal(const TreeView& tree, const PlacedPoint& point, QueryStats& stats, uint64_t most_tests)
-        : tree_(tree), point_(point), at_(lattice_point(point, tree.lattice())), stats_(stats), most_tests_(most_tests),
-          step_exponent_(tree.lattice().step_exponent) {}
+        : tree_(tree), point_(point), at_(lattice_point(point, tree.raw().lattice())), stats_(stats),
+          most_tests_(most_tests), step_exponent_(tree.raw().lattice().step_exponent) {}
 
     std::optional<int64_t> run() {
         if (tree_.is_leaf(0)) return add_crossings(tree_.triangles(0), {}) ? std::optional(winding_) : std::nullopt;
@@ -61,7 +61,7 @@ private:
         for (uint32_t i = 0; i < children.count; i += kBlockLanes) {
             const uint32_t count = std::min(children.count - i, kBlockLanes), used = (1u << count) - 1;
             if (!take(count)) return {};
-            const std::byte* const block = tree_.block(first + i / kBlockLanes);
+            const std::byte* const block = tree_.raw().block(first + i / kBlockLanes);
             const AxisMask masks[3] = {axis_block<0>(block, step_exponent_, at_),
                                        axis_block<1>(block, step_exponent_, at_),
                                        axis_block<2>(block, step_exponent_, at_)};
@@ -83,7 +83,7 @@ private:
         const auto look = [&](Family& family) {
             const uint32_t count = std::min(family.left, kBlockLanes);
             if (!take(count)) return false;
-            const AxisMask mask = axis_block<kAxis>(tree_.block(family.block), step_exponent_, at_);
+            const AxisMask mask = axis_block<kAxis>(tree_.raw().block(family.block), step_exponent_, at_);
             family.mask = (start.direction.negative ? mask.behind : mask.ahead) & ((1u << count) - 1);
             family.left -= count;
             return true;
@@ -101,7 +101,7 @@ private:
             }
             const auto lane = static_cast<uint32_t>(std::countr_zero(family.mask));
             family.mask &= family.mask - 1;
-            const std::byte* const block = tree_.block(family.block);
+            const std::byte* const block = tree_.raw().block(family.block);
             const uint32_t count = load_le<uint8_t>(block + kBlockCount + lane);
             const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
             if (count >= kTriangleLeaf) {

@@ -1,6 +1,8 @@
 // raycast() and its kin: the query around the traversal (search.cpp).
 #include "query/raycast/search.hpp"
 
+#include <prolate/tools.hpp>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -49,7 +51,7 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Query
     }
     query::RaycastSearch search{.side = query::tree_side(tree, options.max_level),
                                 .ray = placed,
-                                .lattice_ray = query::to_lattice(placed, tree.lattice(), options.margin),
+                                .lattice_ray = query::to_lattice(placed, tree.raw().lattice(), options.margin),
                                 .options = options,
                                 .any = any,
                                 .growth = growth,

@@ -60,7 +60,7 @@ private:
         s_.stats.pair_tests += count, ++s_.stats.block_tests;
         s_.side.deepest = std::max(s_.side.deepest, first + count - 1);
         alignas(32) float entries[kBlockLanes];
-        const std::byte* const block = kGrown ? s_.side.tree.block(first / kBlockLanes) : s_.side.block(first);
+        const std::byte* const block = kGrown ? s_.side.tree.raw().block(first / kBlockLanes) : s_.side.block(first);
         const int32_t step_exponent = s_.side.lattice.step_exponent;
         const Float limit = set(limit_);
         if constexpr (kGrown) {

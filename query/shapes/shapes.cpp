@@ -27,7 +27,7 @@ OverlapResult overlap_with(const TreeView& tree, const RoundedBox& shape, QueryC
                            const QueryOptions& options) {
     BoxSearch search{.side = tree_side(tree, options.max_level),
                      .shape = shape,
-                     .lanes = lane_rounded_box(shape, tree.lattice()),
+                     .lanes = lane_rounded_box(shape, tree.raw().lattice()),
                      .options = options,
                      .stack = context.entries,
                      .result = {}};
@@ -40,7 +40,7 @@ OverlapResult overlap_with(const TreeView& tree, const PlacedHalfSpace& shape, Q
                            const QueryOptions& options) {
     HalfSpaceSearch search{.side = tree_side(tree, options.max_level),
                            .shape = shape,
-                           .lanes = lane_half_space(shape, tree.lattice()),
+                           .lanes = lane_half_space(shape, tree.raw().lattice()),
                            .options = options,
                            .stack = context.entries,
                            .result = {}};

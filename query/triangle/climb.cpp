@@ -54,7 +54,7 @@ double Hills::height(uint32_t vertex, const dvec3& up) const noexcept {
 // Calls visit(corners) for each triangle that has this vertex.
 template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) const {
     if (tests_ > most_tests_) return;
-    const BoxProbe probe(tree_.lattice(), tree_.vertex(vertex));
+    const BoxProbe probe(tree_.raw().lattice(), tree_.vertex(vertex));
     struct Family {
         uint32_t first, left; // siblings from slot `first` on
     };
@@ -67,7 +67,7 @@ template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) 
         family.first += kBlockLanes, family.left -= count;
         if (family.left == 0) --size;
         tests_ += count;
-        const std::byte* const block = tree_.block(first / kBlockLanes);
+        const std::byte* const block = tree_.raw().block(first / kBlockLanes);
         const uint32_t held = probe.lanes(block);
         for (uint32_t lane = 0; lane < count; ++lane) {
             if ((held >> lane & 1) == 0) continue;

@@ -72,11 +72,11 @@ public:
 
 private:
     template <class Index> void gather(const TreeView& tree, uint32_t first) {
-        const std::byte* index = tree.triangle_bytes() + size_t{first} * 3 * sizeof(Index);
+        const std::byte* index = tree.raw().triangles() + size_t{first} * 3 * sizeof(Index);
         alignas(16) float corner[3][kFour][4] = {}; // the fourth coordinate means nothing
         for (uint32_t i = 0; i < count_; ++i)
             for (auto& of_all : corner) { // behind the vertices there are at least the 6 bytes of a triangle
-                load_le(tree.vertex_bytes() + size_t{load_le<Index>(index)} * 3 * sizeof(float), of_all[i]);
+                load_le(tree.raw().vertices() + size_t{load_le<Index>(index)} * 3 * sizeof(float), of_all[i]);
                 index += sizeof(Index);
             }
         for (size_t c = 0; c < 3; ++c) transpose(corner[c], 3 * c);

@@ -10,10 +10,10 @@ namespace prolate::query {
 namespace {
 
 template <class Index> double support_of(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) {
-    const std::byte* index = tree.triangle_bytes() + size_t{range.first} * 3 * sizeof(Index);
+    const std::byte* index = tree.raw().triangles() + size_t{range.first} * 3 * sizeof(Index);
     double most = -HUGE_VAL;
     for (uint32_t i = 0; i < 3 * range.count; ++i, index += sizeof(Index)) {
-        const std::byte* const x = tree.vertex_bytes() + size_t{load_le<Index>(index)} * kVertexBytes;
+        const std::byte* const x = tree.raw().vertices() + size_t{load_le<Index>(index)} * kVertexBytes;
         const auto at = [x](size_t k) { return double{load_le<float>(x + k * sizeof(float))}; };
         most = std::max(most, (n.x * at(0) + n.y * at(1)) + n.z * at(2));
     }

@@ -1,9 +1,13 @@
-// Jobs::run for functions and lambdas.
+// Jobs::run for functions and lambdas, and what queries that share out collide() have in common.
 #pragma once
 
+#include <prolate/error.hpp>
 #include <prolate/jobs.hpp>
+#include <prolate/query.hpp>
 
+#include <algorithm>
 #include <cassert>
+#include <span>
 #include <type_traits>
 
 namespace prolate::query {
@@ -24,6 +28,13 @@ template <class Work> void for_ranges(const Jobs& jobs, uint32_t count, uint32_t
             (*j.work)(begin, end, worker);
         },
         &job);
+}
+
+inline constexpr uint32_t kQueryGrain = 8; ///< queries in a range: each takes a fraction of a microsecond to some
+
+inline constexpr Error kTooFewContexts{ErrorCode::bad_options, "each worker needs a context", 0};
+inline bool has_context_each(const Jobs& jobs, std::span<const QueryContext> contexts) noexcept {
+    return contexts.size() >= std::max(1u, jobs.workers);
 }
 
 } // namespace prolate::query

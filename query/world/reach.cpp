@@ -52,8 +52,8 @@ struct Interval {
 
 // How far the boxes of a block reach along r; what lanes without a node say means nothing.
 void box_reaches(const TreeView& tree, uint32_t b, const dvec3& r, double rounding, Interval (&out)[kBlockLanes]) {
-    const BlockBoxes boxes(tree.bounding_block(b));
-    const LatticeInfo lattice = tree.lattice();
+    const BlockBoxes boxes(tree.raw().bounding_block(b));
+    const LatticeInfo lattice = tree.raw().lattice();
     const double step = power_of_two(lattice.step_exponent);
     double wide[kBlockLanes] = {}, at[kBlockLanes] = {}, size[kBlockLanes] = {};
     for (size_t k = 0; k < 3; ++k) {
@@ -74,7 +74,7 @@ void box_reaches(const TreeView& tree, uint32_t b, const dvec3& r, double roundi
 // What the hull of an inner node says. That its triangles reach as far as the points, but for the share, is what
 // builders' files have: it decides when to stop, and nothing else.
 Interval hull_reach(const TreeView& tree, uint32_t node, const ChildRange& children, const dvec3& r, double rounding) {
-    const std::byte* const record = tree.hull(children.first / kBlockLanes);
+    const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
     const double share = load_le<uint8_t>(record + kHullShare) / kHullShares;
     if (share == 0) return {-kInfinite, kInfinite};
     const Along e = along(tree.ellipsoid(node), r);

@@ -273,11 +273,11 @@ TEST(Build, ABoxHoldsItsNodeEvenIfAllCentersCoincide) {
         options.quality = Quality::fast, options.ellipsoids = 1, options.primitive = primitive;
         const Build built = must_build(shapes::box(1, 1, 1), options);
         const TreeView tree = built.tree.view();
-        const LatticeInfo lattice = tree.lattice();
+        const LatticeInfo lattice = tree.raw().lattice();
         const Ellipsoid e = tree.ellipsoid(0);
         const double center[] = {e.center.x, e.center.y, e.center.z};
         const double half[] = {e.l11, std::hypot(e.l21, e.l22), std::hypot(e.l31, e.l32, e.l33)};
-        const std::byte* const block = tree.block(0);
+        const std::byte* const block = tree.raw().block(0);
         for (size_t i = 0; i < 3; ++i) {
             EXPECT_LT(std::ldexp(half[i], -lattice.step_exponent), 0x1p21);
             const double origin = double(lattice.origin[i]) + load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
@@ -571,7 +571,7 @@ TEST(Verify, FailsWhenABoundingVolumeHoldsTooLittle) {
     EXPECT_TRUE(report->covered && report->bounded);
     const auto with = [&](size_t at, int more) { // a byte of the root's bounding block
         std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
-        std::byte& byte = bytes[static_cast<size_t>(tree.bounding_block(0) - tree.bytes().data()) + at];
+        std::byte& byte = bytes[static_cast<size_t>(tree.raw().bounding_block(0) - tree.bytes().data()) + at];
         byte = static_cast<std::byte>(static_cast<int>(byte) + more);
         const auto changed = TreeView::open(bytes, {.check_hash = false});
         EXPECT_TRUE(changed);

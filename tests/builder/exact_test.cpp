@@ -221,7 +221,7 @@ TEST(ExactTree, CoordinatesHaveALimit) {
     const Build built = must_build(largest);
     const TreeView tree = built.tree.view();
     std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
-    const auto at = static_cast<size_t>(tree.vertex_bytes() - tree.bytes().data()) + 12 * 5;
+    const auto at = static_cast<size_t>(tree.raw().vertices() - tree.bytes().data()) + 12 * 5;
     for (const float bad : {3e38f, -kLargestCoordinate * 1.001f, std::numeric_limits<float>::infinity(),
                             std::numeric_limits<float>::quiet_NaN()}) {
         store_le(bytes.data() + at + 4, bad);
@@ -322,7 +322,7 @@ TEST(ExactTree, TheProofNoticesNodesThatDoNotHoldTheirTriangles) {
         const uint32_t node = nodes[nodes.size() / 2];
         // Shrinks one node by an exponent.
         std::vector<std::byte> bytes(built.tree.bytes().begin(), built.tree.bytes().end());
-        const auto block = static_cast<size_t>(tree.block(node / kBlockLanes) - built.tree.bytes().data());
+        const auto block = static_cast<size_t>(tree.raw().block(node / kBlockLanes) - built.tree.bytes().data());
         std::byte& exponent = bytes[block + kBlockExponent + node % kBlockLanes];
         exponent = std::byte(std::to_integer<int>(exponent) - 1);
         const auto shrunk = TreeView::open(bytes, {.check_hash = false});
@@ -373,7 +373,7 @@ TEST_P(ExactTreeOf, HullsReachAsFarAsTheirTriangles) {
         tree.for_each_node([&](uint32_t node) {
             const ChildRange children = tree.children(node);
             if (children.count == 0) return;
-            const std::byte* const hull = tree.hull(children.first / kBlockLanes);
+            const std::byte* const hull = tree.raw().hull(children.first / kBlockLanes);
             if (hull[kHullShare] == std::byte{0}) return;
             ++known;
             for (int i = 0; i < 20; ++i) {
@@ -397,7 +397,7 @@ TEST(ExactTree, HullsAreClose) {
     tree.for_each_node([&](uint32_t node) {
         const ChildRange children = tree.children(node);
         if (children.count > 0)
-            shares.push_back(std::to_integer<int>(tree.hull(children.first / kBlockLanes)[kHullShare]));
+            shares.push_back(std::to_integer<int>(tree.raw().hull(children.first / kBlockLanes)[kHullShare]));
     });
     std::sort(shares.begin(), shares.end());
     EXPECT_GT(shares.front(), 0); // something is known of all nodes
@@ -408,7 +408,7 @@ TEST(ExactTree, HullsAreClose) {
 // The bytes of the tree with half the share in the hull of `node`, or with no points but the center.
 std::vector<std::byte> with_bad_hull(const Tree& tree, uint32_t node, bool half) {
     const TreeView view = tree.view();
-    const std::byte* const from = view.hull(0);
+    const std::byte* const from = view.raw().hull(0);
     std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
     std::vector<std::byte> hulls(from, from + view.block_count() * kHullBytes);
     std::byte* const hull = hulls.data() + size_t{view.children(node).first / kBlockLanes} * kHullBytes;
@@ -580,7 +580,7 @@ TEST(ExactQuery, AgreesWithBruteForceNearContact) {
 TEST(ExactQueryHarness, CatchesHullsThatAreTooSmall) {
     const Body a(shapes::icosphere(2)), b(shapes::torus(1, 0.3f, 20, 10));
     const TreeView sound = a.built.tree.view();
-    const std::byte* const from = sound.hull(0);
+    const std::byte* const from = sound.raw().hull(0);
     std::vector<std::byte> bytes(a.built.tree.bytes().begin(), a.built.tree.bytes().end());
     std::vector<std::byte> hulls(from, from + sound.block_count() * kHullBytes);
     for (size_t i = 0; i < hulls.size(); i += kHullBytes) // 0.7 of what they were

@@ -8,7 +8,7 @@
 #include "cli/render/solid.hpp"
 #include "src/format.hpp"
 
-#include <prolate/raycast.hpp>
+#include <prolate/tools.hpp>
 
 #include <gtest/gtest.h>
 

@@ -165,12 +165,12 @@ void expect_sound(const TreeView& tree) {
               level.surface_error, level.hausdorff_max, level.hausdorff_mean, level.hausdorff_p99})
             ASSERT_TRUE(std::isnan(figure) || (std::isfinite(figure) && figure >= 0));
         ASSERT_LE(level.end_byte, tree.bytes().size());
-        ASSERT_EQ(tree.bytes().data() + level.end_byte, tree.block(0) + kBlockBytes * blocks);
+        ASSERT_EQ(tree.bytes().data() + level.end_byte, tree.raw().block(0) + kBlockBytes * blocks);
     }
     ASSERT_EQ(nodes, tree.node_count());
     ASSERT_EQ(blocks, tree.block_count());
     ASSERT_EQ(tree.slot_count(), kBlockLanes * blocks);
-    ASSERT_EQ((tree.block(0) - tree.bytes().data()) % 64, 0);
+    ASSERT_EQ((tree.raw().block(0) - tree.bytes().data()) % 64, 0);
     const BakeInfo info = tree.bake_info();
     ASSERT_EQ(tree.has_triangles(), info.exact && !tree.is_prefix());
     uint32_t children_seen = 0, next_block = 1, next_triangle = 0;
@@ -230,10 +230,10 @@ TEST(Format, GoldenExactFileOfVersionFive) {
         EXPECT_EQ(tree->triangles(kGoldenSlots[i + 2]).count, kGoldenLeaves[i]);
     }
     EXPECT_EQ(tree->triangles(17).first, 3u);
-    EXPECT_EQ(tree->hull(1), tree->bytes().data() + kExactEnd + 64);
-    EXPECT_EQ(tree->hull(1)[1], std::byte{141});
-    EXPECT_EQ(tree->hull(1)[48], std::byte{17});
-    EXPECT_EQ(tree->hull(2)[48], std::byte{0});
+    EXPECT_EQ(tree->raw().hull(1), tree->bytes().data() + kExactEnd + 64);
+    EXPECT_EQ(tree->raw().hull(1)[1], std::byte{141});
+    EXPECT_EQ(tree->raw().hull(1)[48], std::byte{17});
+    EXPECT_EQ(tree->raw().hull(2)[48], std::byte{0});
 }
 
 TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
@@ -264,9 +264,9 @@ TEST(Format, GoldenFileOfVersionFive) {
     EXPECT_EQ(tree->block_count(), 3u);
     for (uint32_t slot = 0; slot < 24; ++slot)
         EXPECT_EQ(tree->is_node(slot), std::ranges::count(kGoldenSlots, slot) == 1) << slot;
-    EXPECT_EQ(tree->block(1), file.data() + kBlock1);
-    EXPECT_TRUE(std::ranges::equal(tree->lattice().origin, kGoldenLattice.origin));
-    EXPECT_EQ(tree->lattice().step_exponent, kGoldenLattice.step_exponent);
+    EXPECT_EQ(tree->raw().block(1), file.data() + kBlock1);
+    EXPECT_TRUE(std::ranges::equal(tree->raw().lattice().origin, kGoldenLattice.origin));
+    EXPECT_EQ(tree->raw().lattice().step_exponent, kGoldenLattice.step_exponent);
     EXPECT_EQ(tree->level_count(), 3u);
     EXPECT_EQ(tree->degree(), 3u);
     EXPECT_FALSE(tree->is_prefix());

@@ -35,7 +35,7 @@ void check(const Ellipsoid& e) {
 
 // Bytes that open() accepts may put a box anywhere.
 bool root_box_holds_center(const TreeView& tree) {
-    const std::byte* const block = tree.bounding_block(0);
+    const std::byte* const block = tree.raw().bounding_block(0);
     for (size_t i = 0; i < 3; ++i) {
         const auto at = [&](size_t array) { return int64_t{load_le<uint8_t>(block + array + kBlockLanes * i)}; };
         const int64_t origin = load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
@@ -66,7 +66,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     require(seen >= tree.level_count() && tree.degree() >= 2 && tree.degree() <= kMaxDegree);
     (void)tree.bake_info();
     const auto holds_node = [&tree](uint32_t slot) { return slot < tree.slot_count() && tree.is_node(slot); };
-    require(holds_node(0) && tree.block(0) + kBlockBytes * tree.block_count() <= bytes.data() + size);
+    require(holds_node(0) && tree.raw().block(0) + kBlockBytes * tree.block_count() <= bytes.data() + size);
     uint32_t nodes = 0;
     tree.for_each_node([&](uint32_t n) {
         ++nodes;

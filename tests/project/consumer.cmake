@@ -29,11 +29,11 @@ endfunction()
 
 # expect_headers(FOLDER HEADERS...): the folder holds all public headers but for those named.
 function(expect_headers folder)
-  file(GLOB expected RELATIVE ${ROOT}/include/prolate ${ROOT}/include/prolate/*)
+  file(GLOB_RECURSE expected RELATIVE ${ROOT}/include/prolate ${ROOT}/include/prolate/*)
   if(ARGN)
     list(REMOVE_ITEM expected ${ARGN})
   endif()
-  file(GLOB found RELATIVE ${folder} ${folder}/*)
+  file(GLOB_RECURSE found RELATIVE ${folder} ${folder}/*)
   if(NOT found STREQUAL expected)
     message(FATAL_ERROR "installed: ${found}\nexpected: ${expected}")
   endif()

@@ -4,10 +4,10 @@
 # added, or a list that came out empty, cannot slip through.
 cmake_minimum_required(VERSION 3.25)
 
-file(GLOB headers RELATIVE ${HEADERS} ${HEADERS}/*)
+file(GLOB_RECURSE headers RELATIVE ${HEADERS} ${HEADERS}/*)
 set(compiled "")
 foreach(object IN LISTS OBJECTS)
-  if(EXISTS ${object} AND object MATCHES "([^/]+)\\.cpp\\.o(bj)?$")
+  if(EXISTS ${object} AND object MATCHES ".*/headers/(.+)\\.cpp\\.o(bj)?$")
     list(APPEND compiled ${CMAKE_MATCH_1})
   endif()
 endforeach()

@@ -11,7 +11,7 @@ cmake_minimum_required(VERSION 3.25)
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
 set(layers include/prolate src query builder viewer cli)
-set(core_headers "types|error|tree|version")
+set(core_headers "types|error|bake_info|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
 set(include/prolate_headers ".*")
@@ -22,7 +22,7 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|pairs|bounds|jobs|world|glm")
+set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|pairs|poses|bounds|jobs|world|tools|glm")
 set(query_folders "src|query")
 set(query_libraries "glm/.*|hwy/.*")
 # Inside query/: each folder may include itself and these, so queries do not know each other.
@@ -77,7 +77,7 @@ function(allowed out file layer form target)
     set(pattern "${${layer}_libraries}|${extra_${file}}")
     set(subject "${target}")
   else()
-    return() # "name.hpp" without its folder
+    return() # a name without its folder
   endif()
   if(NOT "${subject}" MATCHES "^(${pattern})$")
     return()

@@ -26,7 +26,7 @@ test_links(project.links_selftest links_planted "prolate::core|prolate::query|hw
 
 # Public headers. Three of them are gateways to a library; the others must do without.
 include(project/headers.cmake)
-file(GLOB public_headers RELATIVE ${PROJECT_SOURCE_DIR}/include/prolate CONFIGURE_DEPENDS
+file(GLOB_RECURSE public_headers RELATIVE ${PROJECT_SOURCE_DIR}/include/prolate CONFIGURE_DEPENDS
   ${PROJECT_SOURCE_DIR}/include/prolate/*)
 if(NOT PROLATE_BUILD_BUILDER)
   list(REMOVE_ITEM public_headers eigen.hpp tbb.hpp) # Eigen and oneTBB need not be there
@@ -47,6 +47,10 @@ if(PROLATE_BUILD_BUILDER)
     "-D OBJECTS=$<TARGET_OBJECTS:headers_alone>")
 endif()
 script_test(project.headers_selftest headers_selftest.cmake -D CXX=${CMAKE_CXX_COMPILER} -D WORK=${scratch}/headers)
+
+# Names of files in comments and documents.
+script_test(project.pointers pointers.cmake -D ROOT=${PROJECT_SOURCE_DIR})
+script_test(project.pointers_selftest pointers_selftest.cmake -D WORK=${scratch}/pointers)
 
 # Machines and options that are refused.
 script_test(project.host host.cmake -D ROOT=${PROJECT_SOURCE_DIR} -D CXX=${CMAKE_CXX_COMPILER}

@@ -7,6 +7,7 @@
 #include <prolate/distance.hpp>
 #include <prolate/jobs.hpp>
 #include <prolate/pairs.hpp>
+#include <prolate/poses.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
 #include <prolate/sweep.hpp>
@@ -49,6 +50,11 @@ int main(int argc, char** argv) {
 
     const Bounds box = bounds(tree, far);
     row("bounds.hpp", box.lower.x > 5 && box.upper.x < 15);
+
+    const Pose many[] = {near, far};
+    CollideResult results[2];
+    const bool asked = static_cast<bool>(collide_poses(tree, {&here, 1}, tree, many, results, {&context, 1}));
+    row("poses.hpp", asked && results[0].verdict == Verdict::overlapping && results[1].verdict == Verdict::separated);
 
     auto world = World::create();
     const bool inserted = world && world->insert({.tree = tree, .pose = here}) &&

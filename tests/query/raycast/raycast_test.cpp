@@ -7,6 +7,7 @@
 #include "tests/targets.hpp"
 
 #include <prolate/raycast.hpp>
+#include <prolate/tools.hpp>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>

@@ -3,6 +3,7 @@
 #include "tests/scenes.hpp"
 #include "tests/threads.hpp"
 
+#include <prolate/poses.hpp>
 #include <prolate/world.hpp>
 
 #include <gtest/gtest.h>
