@@ -28,8 +28,8 @@ foreach(layer core query)
   list(APPEND sources ${names})
 endforeach()
 # What no page calls: worlds, batches, rays, shapes, sweeps, writing.
-set(not_called batch poses bounds bounds_tree file format matrix motion ray raycast rounded_box shape_lanes shapes sweep
-  sweep_leaves world world_pairs pairs collide_pairs distance_pairs)
+set(not_called "query/(raycast|shapes|sweep|world)/[a-z_]+" "query/ellipsoid/(collide_pairs|distance_pairs|pairs)"
+  "src/(file|format|matrix)")
 list(JOIN not_called "|" not_called)
 list(FILTER sources EXCLUDE REGEX "/(${not_called})\\.cpp$")
 

@@ -1,5 +1,5 @@
-// collide() for many pairs of a World. Jobs share them out; each result goes to its own place, so nothing depends on who
-// computed it.
+// collide() for many pairs of a World. Jobs share them out; each result goes to its own place, so nothing depends on
+// who computed it.
 #include "query/world/jobs.hpp"
 #include "query/world/state.hpp"
 

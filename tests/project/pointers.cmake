@@ -1,7 +1,7 @@
 # cmake -D ROOT=<source tree> -P pointers.cmake
 #
 # Finds comments and documents that send the reader to a file that does not exist. What looks like a source file or a
-# document (lanes.hpp, query/lanes.hpp) must be the end of a file's path; what begins with a top folder (query/lanes)
+# document (search.hpp, collide/search.hpp) must be the end of a file's path; what begins with a top folder (query/collide)
 # must be the beginning of one. Names with wildcards or placeholders are not judged, nor is CHANGELOG.md, which tells of
 # files that are gone. tests/project/pointers_selftest.cmake plants offences to show that this check finds them.
 cmake_minimum_required(VERSION 3.25)
