@@ -1,4 +1,8 @@
-// Baking: from a triangle mesh to an ellipsoid tree (paper, section 4, Algorithm 1).
+// Baking: from a triangle mesh to an ellipsoid tree.
+//
+// The problem, its error measures and the names alpha, beta, E_sur and E_vol are those of "the paper": S. Liu, C. C. L.
+// Wang, G. Brunnett, J. Wang, "Approximating Solid Objects by Ellipsoid-Tree", 11th IEEE International Conference on
+// Computer-Aided Design and Computer Graphics, 2009, section 4, Algorithm 1.
 #pragma once
 
 #include <prolate/mesh.hpp>
@@ -10,82 +14,98 @@
 
 namespace prolate {
 
-/// Options of build(). The defaults are a sound choice. Only one of levels, ellipsoids, and tolerance or distance
-/// or both may be non-zero; if none is, levels = 3. An exact tree goes down to its triangles instead: it takes none of
-/// them, and of the rest only degree, leaf_triangles and threads change it.
+/// Options of build(). The defaults are a sound choice.
+///
+/// What ends the tree is one of four goals: a number of levels, a number of ellipsoids, a closeness (tolerance,
+/// distance or both), or, with `exact`, the mesh's own triangles. 0 means "not asked"; if nothing is asked, levels = 3.
 struct BuildOptions {
-    uint32_t degree = 8;           ///< children per node, 2 ... kMaxDegree
-    uint32_t levels = 0;           ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more gain nothing
-    uint32_t ellipsoids = 0;       ///< leaves, 1 ... 65536: the best set of exactly so many, with a tree above it
-    float tolerance = 0;           ///< outside ratio of the leaves, above 0: met by few leaves, with a tree above them
-    float distance = 0;            ///< the same for their Hausdorff distance, in % of the diagonal of the mesh's box
-    Method method = Method::voxel; ///< how E_vol is evaluated; analytic needs a closed mesh
+    uint32_t degree = 8; ///< most children of a node, 2 ... kMaxDegree
+
+    uint32_t levels = 0;     ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more would gain nothing
+    uint32_t ellipsoids = 0; ///< number of leaves, 1 ... 65536: the best set of exactly that many, with a tree above it
+    /// Largest outside ratio of the leaves (LevelFigures::outside_ratio), above 0. As few leaves as reach it, with a
+    /// tree above them.
+    float tolerance = 0;
+    /// Largest Hausdorff distance of the leaves from the solid (LevelFigures::hausdorff_max), above 0, in % of the
+    /// diagonal of the mesh's box. As few leaves as reach it, with a tree above them.
+    float distance = 0;
+    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, weld and threads then matter.
+    bool exact = false;
+    uint32_t leaf_triangles = 4; ///< most triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
+
     Primitive primitive = Primitive::ellipsoid; ///< what the nodes are
-    Quality quality = Quality::normal;          ///< voxel resolution and effort of the optimisation
-    float alpha = 0.5f;                         ///< weight of E_sur^3, >= 0 (paper, eq. 3)
-    float beta = 0.5f;                          ///< weight of E_vol, >= 0; alpha + beta > 0
-    uint64_t seed = 1;                          ///< of all that is drawn at random
+    Quality quality = Quality::normal;          ///< resolution of the voxels, and effort of the optimisation
+    Method method = Method::voxel;              ///< how E_vol is evaluated; analytic needs a closed mesh
+    float alpha = 0.5f;                         ///< weight of E_sur^3, at least 0 (paper, eq. 3)
+    float beta = 0.5f;                          ///< weight of E_vol, at least 0; alpha + beta must be above 0
     float weld = kDefaultWeld;                  ///< tolerance for vertices that nearly meet, metres: see clean()
-    bool exact = false;                         ///< make an exact tree (tree.hpp)
-    uint32_t leaf_triangles = 4;                ///< triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
-    uint32_t threads = 0;                       ///< 0 = all cores. The bytes do not depend on it.
+    uint64_t seed = 1;                          ///< of the random numbers
+    uint32_t threads = 0;                       ///< 1 ... 1024, or 0 for all cores; the bytes do not depend on it
 };
 
-/// Checks ranges. Fails with bad_options or unsupported.
+/// Checks that the options are in range and go together. Fails with bad_options or unsupported. Thread-safe.
 Result<void> validate(const BuildOptions& options);
 
-/// Version of the algorithm, from load_mesh() to the quantised nodes. It goes up whenever the same file and options
-/// give other bytes, so that no cache takes an old bake for a new one; build_test has a bake whose bytes are known.
+/// Version of the algorithm, from load_mesh() to the quantised nodes. It rises whenever the same file and options give
+/// other bytes, so that no cache takes an old bake for a new one.
 inline constexpr uint32_t kBuilderVersion = 9;
 
-/// Hash of all but the mesh that changes the bytes: the options (not `threads`), kBuilderVersion, kFormatVersion.
-/// Together with hash(MeshView) of the cleaned mesh it is a bake cache's key, and BakeInfo holds both.
+/// Hash of everything except the mesh that determines the bytes: the options (without `threads`), kBuilderVersion and
+/// kFormatVersion. With hash(MeshView) of the cleaned mesh it makes the key of a cache of bakes. BakeInfo holds both.
+/// Thread-safe.
 uint64_t hash(const BuildOptions& options);
 
-/// Stage of a running build, for a progress display.
+/// How far a build has come.
 struct BuildProgress {
     const char* stage = ""; ///< static text: "voxelise", "split", "prove" ...
-    double fraction = 0;    ///< of the whole build, 0 ... 1, never decreasing
+    double fraction = 0;    ///< of the whole build, 0 ... 1; never falls
     uint32_t nodes = 0;     ///< nodes made so far
 };
 
-/// Called from one thread at a time when something is done, and at least some times a second; return false to cancel
-/// the build, which then ends within a second.
+/// Called several times a second, from one thread at a time. Return false to cancel the build, which then ends within a
+/// second.
 using ProgressCallback = std::function<bool(const BuildProgress&)>;
 
-/// Figures of one level's cut.
+/// The cut at one level: its size and how close it is to the mesh.
 struct LevelReport : LevelFigures {
     uint32_t nodes = 0;   ///< ellipsoids of the cut
-    uint64_t bytes = 0;   ///< file size up to here
-    bool covered = false; ///< proved by verify()
-    double seconds = 0;   ///< wall time spent on this level, proof included
+    uint64_t bytes = 0;   ///< size of the file up to the end of this level
+    bool covered = false; ///< proved as verify() does
+    double seconds = 0;   ///< wall time spent on this level, the proof included
 };
 
-/// What build() made, and what it saw.
+/// Result of build().
 struct Build {
     Tree tree;
-    MeshReport mesh;
-    std::vector<LevelReport> levels;
-    double solid_volume = 0;       ///< cubic metres; 0 where there is no inside, and of exact trees of open meshes
-    double solid_volume_error = 0; ///< cubic metres; found as LevelFigures::outside_ratio_error is
-    double diagonal = 0;           ///< of the mesh's bounding box, metres
-    uint32_t resolution = 0;       ///< voxels along the longest side
-    bool surface_mode = false;
+    MeshReport mesh;                 ///< what clean() found and did
+    std::vector<LevelReport> levels; ///< the root first
+    double solid_volume = 0;         ///< cubic metres; 0 where there is no inside, and of exact trees of open meshes
+    double solid_volume_error = 0;   ///< cubic metres; estimated as LevelFigures::outside_ratio_error is
+    double diagonal = 0;             ///< of the mesh's bounding box, metres
+    uint32_t resolution = 0;         ///< voxels along the box's longest side
+    bool surface_mode = false;       ///< the mesh is open: see build()
     bool goal_reached = true; ///< false: the asked count, tolerance or distance could not be met at this resolution
-    double seconds = 0;
+    double seconds = 0;       ///< wall time
 };
 
-/// Nodes are as thin as the solid, down to semi-axes of 1/16384 of the longest one, of 1e-5 of the diagonal of the
-/// mesh's box, and of 2^-21 of its largest coordinate, which is a few steps of a float: what is thinner is covered as
-/// if it were that thick.
-inline constexpr double kThinnestNode = 0x1p-14, kThinnestNodeOfMesh = 1e-5, kThinnestNodeOfPlace = 0x1p-21;
+/// Smallest semi-axis of a node: this part of its longest one, ...
+inline constexpr double kThinnestNode = 0x1p-14;
+/// ... of the diagonal of the mesh's box, ...
+inline constexpr double kThinnestNodeOfMesh = 1e-5;
+/// ... and of the mesh's largest coordinate (a few steps of a float), whichever is largest. Where the solid is thinner,
+/// it is covered as if it were that thick.
+inline constexpr double kThinnestNodeOfPlace = 0x1p-21;
 
-/// Bakes `mesh`. The same mesh and options give the same bytes, for any number of threads.
-/// Each level is proved to cover before it is returned. An open mesh is baked in surface mode: the cover of its
-/// triangles is guaranteed, its inside only as far as the generalized winding number tells one.
-/// With levels, the leaves have at most about 1.3 times the volume outside the solid that the set of as many
-/// `ellipsoids` has (of their union, if the mesh encloses nothing); levels above them may have more outside than the
-/// root. Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
+/// Bakes `mesh`, after clean(). Every level is proved to cover before it is returned. The same mesh and options give
+/// the same bytes, for any number of threads.
+///
+/// A mesh that is still open after clean() is baked in surface mode: its triangles are certainly covered, its inside
+/// only as far as the generalized winding number tells what is inside.
+///
+/// With `levels`, the leaves have at most about 1.3 times the outside volume of the best set of as many `ellipsoids`
+/// (of the union's volume, if the mesh encloses nothing). Levels in between may have more volume outside than the root.
+///
+/// Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 
 } // namespace prolate

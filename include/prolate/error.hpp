@@ -12,25 +12,24 @@ namespace prolate {
 enum class ErrorCode : uint8_t {
     bad_options = 1,   ///< an option or argument is out of its range
     bad_mesh = 2,      ///< the mesh cannot be baked (no triangles, indices out of range, not finite, no extent)
-    bad_file = 3,      ///< bytes that are not a sound .etree or mesh file, or an .etree of an older format version
+    bad_file = 3,      ///< not a sound .etree or mesh file, or an .etree of an older format version
     newer_version = 4, ///< an .etree of a later format version than this library reads
     io = 5,            ///< the operating system refused to read or write
     cancelled = 6,     ///< the progress callback asked to stop
-    unsupported = 7,   ///< a known word whose work this version does not do
+    unsupported = 7,   ///< a valid request that this version does not carry out
     internal = 8,      ///< a promise of the library did not hold; please report it
-    out_of_memory = 9, ///< there is no more, or the memory resource gave no more; nothing has changed
-    bad_id = 10,       ///< an id that names nothing (any more)
+    out_of_memory = 9, ///< the system or the memory resource has no more; nothing has changed
+    bad_id = 10,       ///< an id that names nothing, or nothing any more
 };
 
-/// A failure. `what` is static text in plain words; `where` is the byte offset, triangle index or option value
-/// it speaks of (0 where there is none).
+/// A failure.
 struct Error {
     ErrorCode code{};
-    const char* what = "";
-    uint64_t where = 0;
+    const char* what = ""; ///< static text in plain words
+    uint64_t where = 0;    ///< the byte offset, index, option's value or errno that `what` is about; 0 if there is none
 };
 
-/// Either a T or an Error. The member names are those of std::expected, so that C++23 can replace it.
+/// Either a T or an Error. The member names are those of std::expected, which can replace it in C++23.
 template <class T> class [[nodiscard]] Result {
 public:
     Result(T value) : value_(std::move(value)) {}

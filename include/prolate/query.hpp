@@ -1,36 +1,39 @@
 // What all queries share: verdicts, limits, counters, scratch. Queries ask about rigid bodies whose shapes are
-// ellipsoid trees: collide.hpp, distance.hpp, contacts.hpp, sweep.hpp, raycast.hpp, shapes.hpp; pairs.hpp asks about
-// two single ellipsoids, world.hpp about many bodies at once.
+// ellipsoid trees: collide.hpp, distance.hpp, contacts.hpp, sweep.hpp, raycast.hpp, shapes.hpp, bounds.hpp. pairs.hpp
+// asks about two single ellipsoids, poses.hpp about many poses of two bodies, world.hpp about many bodies.
 //
-// Every query is noexcept, allocates nothing, keeps no state but what the caller hands in, and returns the same bits
-// for the same input, on every processor and from every compiler that keeps to IEEE 754 (README, "Determinism"). Trees
+// Every query is noexcept, allocates nothing, keeps no state except what the caller hands in, and returns the same bits
+// for the same input, on every processor and from every compiler that follows IEEE 754 (README, "Determinism"). Trees
 // may be shared between threads; a context or cache belongs to one query at a time.
 //
-// What a body is, for all of them:
-//  - a tree without triangles is the union of its leaf ellipsoids, exactly as they decode, filled. The leaves of a
-//    prefix are the nodes of its last level. Inner nodes do not matter: they only tell soon where no leaf is.
-//  - an exact tree is its triangles, and if its mesh is closed, all that they enclose.
-// (A prefix of an exact tree covers the surface and is no body: of it, only *separated* and lower bounds are
-// certified.)
+// What a body is, for all queries:
+//  - A tree without triangles is the union of its solid leaf ellipsoids, exactly as they decode. The leaves of a prefix
+//    are the nodes of its last level and the leaves above it. Inner nodes only help to rule out regions early; they
+//    have no influence on the answer.
+//  - An exact tree is its triangles, and if its mesh is closed, all that they enclose.
+//  - A prefix of an exact tree covers the surface but is no body. Only *separated* and lower bounds are certified of
+//  it.
 //
 // What is certified, for trees that cover their solids:
-//  - separated:   a plane was found between every pair of leaves, or of nodes above them, beyond the rounding error of
-//                 the test. The bodies do not touch, and so neither do the solids.
-//  - overlapping: two leaf ellipsoids have a common point (or come nearer than rounding error can tell apart). The
-//                 covers meet; the solids may still be apart by what the covers stick out.
-//  - undecided:   a budget ran out first. Nothing is claimed.
+//  - separated:   a plane was found between every two leaves, or between nodes above them, beyond the rounding error of
+//                 the test. The bodies do not touch, so the solids do not either.
+//  - overlapping: two leaf ellipsoids have a common point (or are so close that rounding hides the gap). The covers
+//                 meet; the solids may still be separated, because covers stick out.
+//  - undecided:   the budget ran out first. Nothing is claimed.
 // Of exact trees:
-//  - separated:   neither do the triangles of the two bodies touch, nor does a closed one enclose a part of the other.
-//  - overlapping: two triangles have a common point (coplanar and touching ones too; or come nearer than rounding error
-//                 can tell apart, about 1e-13 of the lengths that enter), or a vertex of one body lies inside the
-//                 other. Against a tree without triangles, its leaf ellipsoids take the triangles' place.
-// Two leaves, or triangles, are decided on by one test with the bodies in one order, so all queries of the same two
-// bodies give the same verdict to the bit: collide(), collide_all() (`found`), distance(), contacts(), and those of a
-// world. sweep() has a tolerance: where it separates collide() does, and where that overlaps at the start, it says so.
+//  - separated:   no triangles of the two bodies touch, and neither body, if closed, encloses a part of the other.
+//  - overlapping: two triangles have a common point, coplanar and touching ones included (or are so close that rounding
+//                 hides the gap: about 1e-13 of the lengths involved), or a vertex of one body lies inside the other.
+//                 Against a tree without triangles, its leaf ellipsoids take the triangles' place.
+// Two leaves, or two triangles, are always decided by the same test with the bodies in the same order. So all queries
+// about the same two bodies agree on the verdict, to the bit: collide(), collide_all(), distance(), contacts(), and
+// those of a world. sweep() has a tolerance: where it says separated, so does collide(); and where collide() says
+// overlapping at the start, so does sweep().
 //
-// A pose that is not finite, or whose quaternion is zero, never separates. Lengths are defined for every number:
-// margins, radii, half extents and max_distance that are negative count as 0, and NaN as infinite; with an infinite
-// margin, all bodies meet. Tolerances that are negative or NaN count as 0.
+// "The lengths involved" in such bounds are the sizes of the bodies and the distances between them and the origins of
+// their frames. A pose that is not finite, or whose quaternion is zero, never separates. Lengths may be any number:
+// negative margins, radii, half extents and max_distance count as 0, and NaN as infinite. With an infinite margin, all
+// bodies meet. Negative and NaN tolerances count as 0.
 #pragma once
 
 #include <prolate/tree.hpp>
@@ -45,23 +48,21 @@ enum class Verdict : uint8_t { separated, overlapping, undecided };
 
 /// Limits of a query.
 struct QueryOptions {
-    /// Look no deeper than this level of either tree (0 = roots only): where the descent would go deeper, two nodes
-    /// that the culling test cannot tell apart count as meeting, with all that may lie below them. Which pairs of nodes
-    /// are tested does not depend on it, so deeper never contradicts shallower: a shallow *separated* holds at every
-    /// depth. Ellipsoids of exact trees cover surfaces; short of the leaves nothing is said of what they enclose, nor
-    /// is it by a prefix of such a tree.
+    /// Look no deeper than this level of either tree (0 = roots only). There, two nodes that the culling test does not
+    /// separate count as meeting, with all that lies below them. The order of the search does not depend on max_level,
+    /// so a deeper search never contradicts a shallower one: a shallow *separated* holds at every depth. The ellipsoids
+    /// of exact trees cover only surfaces, so above the leaves, and in a prefix, nothing is said of what they enclose.
     uint32_t max_level = kMaxLevels;
-    /// Stop before this many tests, of nodes and of triangles together, would be exceeded: QueryStats::tests().
+    /// Stop before more than this many tests, of nodes and of triangles together, are made: QueryStats::tests().
     uint64_t max_pair_tests = UINT64_MAX;
-    /// Inflate the bodies by this distance together, metres: bodies not farther apart than this count as meeting.
-    /// Negative counts as 0; infinite or NaN: all meet.
+    /// Bodies at most this far apart count as meeting, metres. Negative counts as 0; with infinity or NaN, all meet.
     float margin = 0;
 };
 
 /// Work that a query did.
 struct QueryStats {
     uint64_t pair_tests = 0;     ///< nodes tested against a node, a shape or a ray
-    uint64_t block_tests = 0;    ///< blocks of up to eight siblings that were tested at once: the unit of time
+    uint64_t block_tests = 0;    ///< blocks of up to eight siblings tested at once; time is about proportional to this
     uint64_t triangle_tests = 0; ///< triangles tested against triangles, leaf ellipsoids, shapes or rays
     uint32_t deepest_level = 0;  ///< deepest level that a tested node came from
 

@@ -5,6 +5,7 @@
 //  - a Pose first rotates, then translates: world = rotate(pose.rotation, local) + pose.translation;
 //  - quaternions are stored x, y, z, w;
 //  - all of these types are standard-layout, so that a C binding or a memcpy is safe.
+// matrix.hpp, eigen.hpp and glm.hpp convert from and to others.
 #pragma once
 
 #include <array>

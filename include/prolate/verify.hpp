@@ -15,27 +15,28 @@ struct LevelProof {
     bool covered = false;            ///< proved: every point of the solid lies in an ellipsoid of the cut
     bool has_counterexample = false; ///< `point` belongs to the solid and lies in no ellipsoid of the cut
     double point[3] = {};            ///< the counterexample, or where the subdivision gave up
-    double depth = 0;                ///< of the counterexample: smallest radial excess |L^-1 (p - c)| - 1 over the cut
-    uint64_t pieces = 0;             ///< pieces of the solid that were looked at
+    double depth = 0;    ///< of the counterexample: smallest |L^-1 (p - c)| - 1 over the ellipsoids of the cut
+    uint64_t pieces = 0; ///< pieces of the solid that were looked at
 };
 
+/// Result of verify().
 struct VerifyReport {
-    bool covered = false;  ///< every level is, and if there is no triangle, `bounded`
+    bool covered = false;  ///< every level is covered, and `bounded` holds
     bool exact = false;    ///< the tree holds triangles
-    bool same_mesh = true; ///< of an exact tree: they are the mesh's. If not, no level counts as covered.
-    /// Of a tree without triangles: the bounding volumes hold all that lies below their nodes. If not, queries may
-    /// overlook it, and `unbounded_node` is the first node whose does not.
+    bool same_mesh = true; ///< of an exact tree: its triangles are the mesh's. If not, no level counts as covered.
+    /// Of a tree without triangles: each bounding volume holds all that lies below its node. If not, queries may
+    /// overlook some of it, and `unbounded_node` is the first node whose bounding volume fails.
     bool bounded = true;
     uint32_t unbounded_node = 0;
-    bool surface_mode = false; ///< the mesh is open: its triangles were proved, there is no inside
-    std::vector<LevelProof> levels;
+    bool surface_mode = false;      ///< the mesh is open: the proof is about its triangles, there is no inside
+    std::vector<LevelProof> levels; ///< the root first
 };
 
 /// Options of verify().
 struct VerifyOptions {
     uint32_t threads = 0; ///< 0 = all cores
-    /// Called now and then, at least some times a second, from one thread at a time, with the fraction done; return
-    /// false to cancel: verify() then ends within a second.
+    /// Called several times a second, from one thread at a time, with the fraction done. Return false to cancel:
+    /// verify() then ends within a second.
     std::function<bool(double)> progress;
 };
 
