@@ -1,9 +1,10 @@
 # cmake -D ROOT=<source tree> -P pointers.cmake
 #
 # Finds comments and documents that send the reader to a file that does not exist. What looks like a source file or a
-# document (search.hpp, collide/search.hpp) must be the end of a file's path; what begins with a top folder (query/collide)
-# must be the beginning of one. Names with wildcards or placeholders are not judged, nor is CHANGELOG.md, which tells of
-# files that are gone. tests/project/pointers_selftest.cmake plants offences to show that this check finds them.
+# document (search.hpp, collide/search.hpp) must be the end of a file's path, in query/ and builder/ of a file that they
+# may know; what begins with a top folder (query/collide) must be the beginning of one. A document's links to ../ must lead
+# to a file. Names with wildcards or placeholders are not judged, nor is CHANGELOG.md, which tells of files that are gone.
+# tests/project/pointers_selftest.cmake plants offences to show that this check finds them.
 cmake_minimum_required(VERSION 3.25)
 
 set(folders src include query builder viewer cli tests bench examples docs findings cmake)
@@ -18,20 +19,33 @@ foreach(file IN LISTS files)
 endforeach()
 string(REPLACE ";" "|" any_folder "${folders}")
 
-# missing(OUT WORD): does `word` name a file that does not exist?
-function(missing out word)
-  string(REGEX REPLACE "^\\./|[./-]+$" "" word "${word}")
-  if(word MATCHES "[<>*{}$]|\\.\\.|(^|/)[A-Z]+$")
-    set(at 0)
-  elseif(word MATCHES "[A-Za-z0-9_-]\\.(cpp|hpp|cmake|md|js|mjs|py|txt)$")
-    string(FIND "${paths}" "/${word}\n" at)
-  elseif(word MATCHES "^(${any_folder})/[a-z]")
-    string(FIND "${paths}" "\n/${word}" at)
-  else()
-    set(at 0)
-  endif()
+# missing(OUT FILE WORD): does `word`, in `file`, name a file that does not exist?
+function(missing out file word)
   set(${out} FALSE PARENT_SCOPE)
-  if(at EQUAL -1)
+  string(REGEX REPLACE "^\\./|[./-]+$" "" word "${word}")
+  if(word MATCHES "[<>*{}$]|(^|/)[A-Z]+(\\.[ch]pp)?$|^-")
+    return()
+  elseif(word MATCHES "^\\.\\./" AND file MATCHES "\\.md$")
+    cmake_path(GET file PARENT_PATH folder)
+    cmake_path(SET path NORMALIZE "${folder}/${word}")
+    set(pattern "\n/${path}")
+    if(path MATCHES "^\\.\\./")
+      return() # outside of the tree
+    endif()
+  elseif(word MATCHES "\\.\\.")
+    return()
+  elseif(word MATCHES "[A-Za-z0-9_-]\\.(cpp|hpp|cmake|md|js|mjs|py|txt)$")
+    set(pattern "/${word}\n")
+    if(file MATCHES "^(query|builder)/")
+      set(pattern "\n/((${CMAKE_MATCH_1}|src|include|tests)/([^\n]*/)?)?${word}\n")
+    endif()
+  elseif(word MATCHES "^(${any_folder})/[a-z]")
+    set(pattern "\n/${word}")
+  else()
+    return()
+  endif()
+  string(REPLACE "." "\\." pattern "${pattern}")
+  if(NOT paths MATCHES "${pattern}")
     set(${out} TRUE PARENT_SCOPE)
   endif()
 endfunction()
@@ -67,7 +81,7 @@ foreach(file IN LISTS files)
     string(REGEX REPLACE "[^A-Za-z0-9_./<>*{}$-]+" ";" words "${words}")
     list(FILTER words INCLUDE REGEX "[./]")
     foreach(word IN LISTS words)
-      missing(is_missing "${word}")
+      missing(is_missing "${file}" "${word}")
       if(is_missing)
         string(FIND "${text}" "${line}" at)
         string(SUBSTRING "${text}" 0 ${at} above)
