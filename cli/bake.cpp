@@ -17,21 +17,21 @@ namespace prolate::cli {
 namespace {
 
 constexpr const char* kFooter = R"(
-Give at most one of --levels, --ellipsoids, and --tolerance or --distance or both; without one, 3 levels are made.
---tolerance and --distance take as few leaves as will do, each where the shape needs it; the cover sticks out by no more
-than that volume and that distance.
-With --exact the tree goes down to the triangles and keeps them, a few in each leaf: its ellipsoids cover the surface
-only and cull, and queries answer as the triangles do. 100,000 triangles take about a second, whatever the quality.
-Coordinates are the file's own, taken as metres, unless --unit or --scale says more; a 3MF's unit is applied, a DAE's only
-told. The tree keeps scale and local origin, and answers of queries are relative to it. Vertices that nearly meet are joined
-if that closes the mesh (--weld 0: never), and the cover holds them where they stood. Closed parts that are inside out are
-turned. The same mesh and options give the same bytes.
-An open mesh has no certain inside: it is baked in surface mode, where the cover of its triangles is guaranteed.
+The goal is --levels, --ellipsoids, a closeness (--tolerance, --distance or both) or --exact. Give at most one; the
+default is 3 levels. For a closeness, the tree gets as few leaves as reach it, more where the shape needs more: the
+cover then sticks out of the solid by no more than that volume and that distance. With --exact, the tree goes down
+to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover the surface only, and queries
+answer for the triangles. 100,000 triangles take about a second, whatever the quality. Coordinates are taken from
+the file, as metres unless --unit or --scale says otherwise. The unit that a 3MF states is applied; that of a DAE is
+only reported. The tree stores scale and local origin, and answers of queries are relative to it. Vertices that
+nearly meet are joined if that closes the mesh (--weld 0: never), and the cover holds them where they were. Closed
+parts that are inside out are reversed. The same mesh and options give the same bytes. An open mesh has no certain
+inside. It is baked in surface mode, in which only the cover of its triangles is certain.
 
-What is not done twice: if the output file already is what this mesh and these options make, only its date is
-renewed ("unchanged"). A folder given by --cache, or by the environment's PROLATE_CACHE, keeps every tree for the next time, for
-other outputs and for other machines ("cached"); with one, an unchanged mesh is not even imported. Both look at the
-mesh's content, the options and the builder's version, never at dates. Delete from the folder what you like.
+Nothing is baked twice. If the output already is what this mesh and these options make, only its date is renewed
+("unchanged"). A folder named by --cache, or by the environment variable PROLATE_CACHE, keeps every tree for later
+runs, other outputs and other machines ("cached"); then an unchanged mesh is not even imported. Both compare the
+content of the mesh, the options and the version of the builder, never dates. You may delete any file of the folder.
 
 A manifest bakes many assets in one run. It is a JSON file:
   {
@@ -41,10 +41,11 @@ A manifest bakes many assets in one run. It is a JSON file:
       {"mesh": "models/castle.glb", "output": "baked/castle.etree", "levels": 4, "report": "baked/castle.json"}
     ]
   }
-An entry has mesh, output, and any of the options above by their long names, without dashes: numbers, texts, and true for
-an option without a value. What an entry does not say, the defaults do; if it has one of levels, ellipsoids, tolerance,
-distance and exact, those of the defaults do not count. Paths are relative to the manifest's folder. A bad entry, or an asset that
-fails, is told in one line and does not stop the others; the exit code is then 1. Ctrl-C keeps what is done.
+An entry has a mesh, an output, and any of the options above by their long names without dashes. Values are numbers
+or strings, and true for an option without a value. Missing options are taken from the defaults; but an entry with
+one of levels, ellipsoids, tolerance, distance and exact takes none of these from them. Paths are relative to the
+manifest's folder. A bad entry, or an asset that fails, is reported in one line and does not stop the others; the
+exit code is then 1. Ctrl-C keeps what is done.
 )";
 
 constexpr const char* kExamples = R"(
@@ -78,8 +79,8 @@ Outcome<ExitCode> run_one(BakeArguments& a) {
     const auto baked = bake_asset(a.asset, a.outputs, cache, a.rebake, "");
     if (!baked) return baked.error();
     if (baked->source == Source::unchanged)
-        note(a.asset.output, "unchanged: made from this mesh with these options (--rebake bakes anew)");
-    if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--rebake bakes anew)");
+        note(a.asset.output, "unchanged: made from this mesh with these options (--rebake bakes it again)");
+    if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--rebake bakes it again)");
     const std::string shown =
         a.json ? text_of(report_of(a.asset, *baked)) : level_table(baked->tree.view(), baked->level_seconds);
     if (is_quiet() && !a.json) return kDone;
@@ -96,7 +97,7 @@ Outcome<ExitCode> run(BakeArguments& a) {
     const std::string report = a.asset.report;
     for (const CLI::Option* option : a.asset_options)
         if (option->count() > 0)
-            return Failure{kUsage, option->get_name(), "does not go with --manifest", "say it in the manifest"};
+            return Failure{kUsage, option->get_name(), "cannot be combined with --manifest", "set it in the manifest"};
     BakeCache cache(a.cache);
     a.outputs.reads(a.cache, "the cache folder");
     return bake_manifest(a.manifest, a.outputs, cache, {a.rebake, a.json, a.asset.options.threads, report});

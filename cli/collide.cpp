@@ -22,12 +22,12 @@ namespace {
 
 constexpr const char* kFooter = R"(
 The pose is that of B in the frame of A: translation tx,ty,tz, then optionally the rotation as a quaternion
-qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapping" speaks of the covers: the solids
-may still be apart by what the covers stick out. Of exact trees, it speaks of their triangles, or of a body inside the
-other. The distance is that of the bodies of which the verdict speaks, with certain bounds; the points are the nearest
-ones found, in the frame of A. Nodes are named by their slots in the file, as "export" has them.
+qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapping" is about the covers; because
+they stick out, the solids may still be separated. For exact trees, it is about their triangles, or about a body
+inside the other. The distance is that of the same bodies, with certain bounds; the points are the nearest ones
+found, in the frame of A. Nodes are named by their slots in the file, as in "export".
 
-The exit code is 0 whatever the verdict; with --exit-code 0 means separated, 1 overlapping, 6 undecided (--budget).
+The exit code is 0 whatever the verdict. With --exit-code, 0 means separated, 1 overlapping, 6 undecided (--budget).
 
 Examples:
   prolate collide horse.etree bunny.etree --pose 0.5,0,0
@@ -150,8 +150,8 @@ void add_collide(CLI::App& app, Work& chosen) {
     command->add_option("--pose", a->pose, "of B in the frame of A: tx,ty,tz[,qx,qy,qz,qw]")->capture_default_str();
     command->add_option("--level", a->level, "look no deeper than this level (default: all)");
     command->add_option("--budget", a->budget,
-                        "stop undecided after so many tests of nodes and triangles (default: never)");
-    command->add_flag("--exit-code", a->exit_code, "tell the verdict by the exit code, too; see below");
+                        "stop undecided after this many tests of nodes and triangles (default: never)");
+    command->add_flag("--exit-code", a->exit_code, "report the verdict by the exit code as well; see below");
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });

@@ -19,27 +19,28 @@ namespace {
 constexpr const char* kFormats[] = {"csv", "json", "ply", "obj", "glb", "pov"};
 
 constexpr const char* kFooter = R"(
-The cut at a level (its nodes and the leaves above it) covers the solid. Without --level: csv holds the cut of every
-level, a leaf above it again for each; json holds every node once, with its own level; the others picture the finest
-cut. With --level L: the cut at L. Nodes are named by their slots in the file, which have gaps. Of an exact tree, these
-are the ellipsoids, and json adds the triangles of each leaf, as places in the file's order.
+The cut at a level (its nodes and the leaves above it) covers the solid. With --level L, the cut at L is exported.
+Without, csv has the cut at every level, so that leaves appear once for each level; json has every node once, with
+its own level; the others have the finest cut. Nodes are named by their slots in the file, which have gaps. For an
+exact tree, these are the ellipsoids, and json adds the triangles of each leaf, by their index in the file.
 
   csv   level,cx,cy,cz,r1,r2,r3,R11,...,R33: center, radii, and the rotation row by row; its column i is the direction
         of radius i
-  json  the same, the factor L of {center + L u : |u| <= 1}, row by row, and the tree's links
+  json  the same, the factor L of {center + L u : |u| <= 1} row by row, and the tree's links
   ply, obj  ellipsoids as meshes
-  glb   glTF 2.0, for Blender and viewers: one sphere, and a node for each ellipsoid that moves, turns and stretches it
+  glb   glTF 2.0, for Blender and viewers: a sphere, and for each ellipsoid a node that moves, rotates and stretches it
   pov   a POV-Ray scene with true ellipsoids, a camera, an area light and a ground plane
 
-What covers: centers and factors (json, pov) are exact, also as read in single precision. Radii (csv, json) are rounded
-up, and cover as read in double precision; in single precision, multiply them by 1 + 3e-7 r1 / r3. Meshes for collision
-- ply and obj, unless --no-outer is given - have their triangles outside the ellipsoids, as read in single precision,
-and cover. Pictures - glb, unless --outer is given - have their corners on the ellipsoids, and do not.
+What covers: centers and factors (json, pov) are exact, even when read in single precision. Radii (csv, json) are
+rounded up and cover when read in double precision; for single precision, multiply them by 1 + 3e-7 r1 / r3. Meshes
+for collision (ply and obj, unless you give --no-outer) have their triangles outside the ellipsoids, even when read
+in single precision, and cover. Meshes for viewing (glb, unless you give --outer) have their corners on the
+ellipsoids and do not cover.
 
-obj for collision has no parts and no colors, because simulators drop triangles of parts; many of them take the convex
-hull of a whole file. With --no-outer, obj names each ellipsoid by its node. ply has a color for each corner.
+An obj for collision has no parts and no colors, because simulators drop triangles of parts; many of them take the
+convex hull of a whole file. With --no-outer, obj names each ellipsoid by its node. ply has a color for each corner.
 
-Colors are those of "prolate render": a hue for each child of the root, which all below it keep.
+Colors are those of "prolate render": a hue for each child of the root, shared by all nodes below it.
 
 Examples:
   prolate export horse.etree -o cover.csv --level 2
@@ -125,7 +126,7 @@ void add_export(CLI::App& app, Work& chosen) {
     command->add_option("-o,--output", a->output, "the file to write, or - for standard output")->required();
     command->add_option("--format", a->format, "csv, json, ply, obj, glb or pov (default: the output's extension)");
     command->add_option("--level", a->level, "export the cut at this level, 0 = the root");
-    command->add_option("--segments", a->segments, "ply, obj, glb: of a section through an ellipsoid, in steps of 4")
+    command->add_option("--segments", a->segments, "ply, obj, glb: edges around an ellipsoid, a multiple of 4")
         ->check(CLI::Range(4u, kMaxSegments))
         ->capture_default_str();
     command->add_flag_function(

@@ -46,7 +46,7 @@ std::string_view advice_for_errno(int number) {
     case ENAMETOOLONG:
         return "take a shorter name";
     case EAGAIN:
-        return "raise the limit of processes (ulimit -u)";
+        return "raise the limit on processes (ulimit -u)";
     case EACCES:
     case EPERM:
     case EROFS:

@@ -47,7 +47,7 @@ Result<Mesh> load_standard_input(const ImportOptions& options, ImportReport& rep
     std::string name = (std::filesystem::temp_directory_path(error) / "prolate-XXXXXX.").string() + kind;
     const int file = error ? -1 : ::mkstemps(name.data(), static_cast<int>(kind.size()) + 1);
     if (file < 0)
-        return Error{ErrorCode::io, "cannot be kept in the folder for temporary files", static_cast<uint64_t>(errno)};
+        return Error{ErrorCode::io, "cannot be stored in the folder for temporary files", static_cast<uint64_t>(errno)};
     ::close(file);
     const auto written = save(name.c_str(), std::as_bytes(std::span(*bytes)));
     auto mesh = written ? load_mesh(name.c_str(), options, &report, not_interrupted) : Result<Mesh>(written.error());
@@ -59,7 +59,7 @@ Result<Mesh> load_standard_input(const ImportOptions& options, ImportReport& rep
 Outcome<> take_standard_input() {
     static bool taken = false;
     if (std::exchange(taken, true))
-        return Failure{kUsage, "-", "standard input can be only one of the inputs", "name a file"};
+        return Failure{kUsage, "-", "only one of the inputs can be standard input", "name a file"};
     return kSuccess;
 }
 

@@ -27,14 +27,14 @@ double percent(double length, double diagonal) {
 } // namespace
 
 const char* const kLevelTableHelp = R"(
-The table has a row for each level. Its figures are those of the cut: the nodes of that level and the leaves above it,
-as they are in the file. Every cut covers the solid; that of an exact tree covers its surface, and has no figures.
+The table has a row for each level. Its figures are about the cut: the nodes of that level and the leaves above it,
+as stored in the file. Every cut covers the solid; that of an exact tree covers the surface, and has no figures.
   outside ratio  volume of the cut outside the solid / volume of the solid
   +/-            estimated error of that ratio
-  singly         the same ratio, summed over the ellipsoids as if each were alone: counts overlaps
+  singly         the same ratio, summed over the ellipsoids one by one, so that overlaps count several times
   E_sur          largest radial distance between an ellipsoid and the surface points that it stands for
-  H              distance from the cover to the solid (one-sided Hausdorff; of an open mesh, to its triangles): none of
-                 the cover is farther than the maximum; mean and 99th percentile are over its surface
+  H              distance of the cover from the solid (one-sided Hausdorff; of an open mesh, from its triangles):
+                 maximum, and mean and 99th percentile over the cover's surface
 E_sur and H are in percent of the diagonal of the mesh's bounding box.)";
 
 uint32_t cut_size(const TreeView& tree, uint32_t level) {

@@ -26,12 +26,12 @@ Examples:
 
 A file may be -: standard input or output.
 
-Exit codes: 0 done, 1 the answer is "no" (verify, collide --exit-code) or some assets failed (bake --manifest), 2 usage,
-3 bad input, 4 reading or writing failed, or memory or threads are short, 5 an error in prolate itself, 6 undecided
-(collide --exit-code), 130 interrupted (128 and the number of the signal). With --json, an error is printed as JSON, too:
-{"error": {"code", "subject", "what", "advice"}}.
+Exit codes: 0 done, 1 the answer is "no" (verify, collide --exit-code) or some assets failed (bake --manifest), 2
+wrong usage, 3 bad input, 4 reading or writing failed, or memory or threads ran out, 5 an error in prolate itself, 6
+undecided (collide --exit-code), 128 + the number of a signal that interrupted it (130 for Ctrl-C). With --json, an
+error is printed as JSON as well: {"error": {"code", "subject", "what", "advice"}}.
 
-'prolate COMMAND --help' or 'prolate help COMMAND' tells more; 'prolate man' is all of it in one page.)";
+'prolate COMMAND --help' or 'prolate help COMMAND' describes a command; 'prolate man' is all of it on one page.)";
 
 // "did you mean 'bake'?", or where to look.
 std::string hint(std::string_view word, const std::vector<std::string>& known, const std::string& otherwise) {
@@ -65,7 +65,7 @@ Outcome<> check_words(const CLI::App& app, const std::vector<std::string>& words
 // A whole number, of digits only: the parser would take "" for 0 and -1 for 2^64 - 1.
 std::string check_number(const std::string& word) {
     const bool digits = std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; });
-    return digits && !word.empty() ? "" : fmt::format("\"{}\" is no whole number, 0 or above", word);
+    return digits && !word.empty() ? "" : fmt::format("\"{}\" is not a whole number of 0 or more", word);
 }
 std::string check_not_empty(const std::string& word) {
     return word.empty() ? "its value is empty" : "";
@@ -75,7 +75,7 @@ std::string check_not_empty(const std::string& word) {
 void complete(CLI::App& app) {
     for (CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
         command->add_flag_callback("-q,--quiet", be_quiet,
-                                   "no notes, no progress, no table beside a file: errors only");
+                                   "print errors only: no notes, no progress, no table beside a file");
         for (CLI::Option* option : command->get_options()) {
             if (option->get_items_expected_max() == 0) continue;
             const bool number = option->get_type_name() == "UINT";

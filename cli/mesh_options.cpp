@@ -32,7 +32,7 @@ void declare_mesh_options(CLI::App& app, MeshOptions& options, bool tree) {
         ->delimiter(',')
         ->expected(1, 3)
         ->allow_extra_args(false); // or it would swallow the file names that follow
-    app.add_flag("--recentre", options.recentre, "take a mesh far from (0, 0, 0) around a local origin" + unless);
+    app.add_flag("--recentre", options.recentre, "read a mesh far from (0, 0, 0) around a local origin" + unless);
 }
 
 Outcome<ImportOptions> import_options(const MeshOptions& options, const std::optional<Placement>& placement) {
@@ -76,19 +76,21 @@ void describe_mesh(const std::string& path, const MeshReport& report, bool for_e
     if (report.welded_vertices > 0)
         note(path, fmt::format("{} vertices joined with others up to {:.2g} m away, which closes the mesh; {}",
                                grouped(report.welded_vertices), report.weld_distance,
-                               for_exact_tree ? "answers are for the mesh so joined"
-                                              : "its surface is covered as it stood before, too"));
+                               for_exact_tree ? "answers are for the joined mesh"
+                                              : "the surface is covered as it was before, too"));
     if (report.turned_shells > 0)
-        note(path, fmt::format("{} closed part{} inside out: turned", grouped(report.turned_shells),
+        note(path, fmt::format("{} closed part{} inside out: reversed", grouped(report.turned_shells),
                                report.turned_shells == 1 ? " was" : "s were"));
     if (report.degenerate_triangles > 0)
         note(path, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
     if (report.non_manifold_edges > 0)
         note(path, fmt::format("{} edges belong to three or more triangles", grouped(report.non_manifold_edges)));
     if (!report.closed && report.open_edges == 0)
-        note(path, "its triangles are all there twice, facing both ways, so it encloses nothing: surface mode");
+        note(path, "each triangle is also there in reverse, so the mesh encloses nothing (surface mode)");
     if (report.open_edges > 0)
-        note(path, fmt::format("{} open edges: no inside can be promised, surface mode", grouped(report.open_edges)));
+        note(path,
+             fmt::format("{} open edges: no inside can be promised, so only the triangles are covered (surface mode)",
+                         grouped(report.open_edges)));
 }
 
 } // namespace prolate::cli

@@ -144,8 +144,8 @@ Outcome<> Outputs::check_content(const std::string& path, std::string_view kind)
     const auto head = read_file(path, kMarkReach);
     if (head && is_ours(kind, *head)) return kSuccess;
     return Failure{kIo, path,
-                   head ? fmt::format("is there already, and no .{} file of prolate's", kind)
-                        : "is there already, and its content cannot be read",
+                   head ? fmt::format("exists and is not a .{} file that prolate wrote", kind)
+                        : "exists, and its content cannot be read",
                    "name another file, or replace it with --force"};
 }
 

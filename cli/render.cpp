@@ -89,7 +89,7 @@ Outcome<SheetOptions> sheet_options(const RenderArguments& a) {
         return Failure{kUsage, out.heat ? "--heat" : "--mesh overlay", "there is no mesh",
                        "name the mesh after the tree"};
     if (out.heat && a.mesh_style == "overlay")
-        return Failure{kUsage, "--heat", "colours cannot be told when the mesh shines through",
+        return Failure{kUsage, "--heat", "colours cannot be read when the mesh shines through",
                        "leave out --mesh overlay, or try --section"};
     const auto view = view_of(a.view);
     if (!view) return view.error();
@@ -119,8 +119,9 @@ Outcome<ExitCode> run(RenderArguments& a) {
         auto read = read_mesh_of(view, a.mesh, a.mesh_options);
         if (!read) return read.error();
         if (!read->own)
-            note(a.mesh, fmt::format("not the mesh that {} was baked from{}", a.tree,
-                                     options->heat ? ": the colours tell how far the tree sticks out of another" : ""));
+            note(a.mesh,
+                 fmt::format("not the mesh that {} was baked from{}", a.tree,
+                             options->heat ? ": the colours show how far the tree sticks out of another one" : ""));
         mesh = std::move(read->cleaned);
     }
     // The root is by far the largest, so it would make all else small: it is shown only if asked for.
@@ -144,7 +145,7 @@ Outcome<ExitCode> run(RenderArguments& a) {
 
 void add_render(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<RenderArguments>();
-    CLI::App* command = app.add_subcommand("render", "Picture the levels of a tree beside its mesh, as a PNG file");
+    CLI::App* command = app.add_subcommand("render", "Draw the levels of a tree beside its mesh, as a PNG file");
     command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_option("mesh", a->mesh, "the mesh that it was baked from");
     command->add_option("-o,--output", a->output, "the PNG file to write, or - for standard output")->required();
@@ -161,14 +162,14 @@ void add_render(CLI::App& app, Work& chosen) {
         ->capture_default_str();
     command->add_option(
         "--section", a->section,
-        "cut away the viewer's side of a plane across x, y or z, halfway or as z,0.4 says, and show the "
-        "mesh's section in the tree's");
+        "cut away the viewer's side of a plane across x, y or z (halfway, or at 0.4 of the extent for z,0.4), and show "
+        "the mesh's section within the tree's");
     command->add_flag("--heat", a->heat,
-                      "colour by how far the tree sticks out of the mesh, and give the mean and the maximum, or of "
-                      "open meshes what 99 % stay within");
+                      "colour by how far the tree sticks out of the mesh, and print the mean and the maximum, or for "
+                      "open meshes the 99th percentile");
     command
         ->add_option("--heat-top", a->heat_top,
-                     "the same, with the legend's end at so many % of the diagonal (default: as needed)")
+                     "the same, with a legend that ends at this many % of the diagonal (default: as needed)")
         ->check(CLI::PositiveNumber);
     command->add_option("--samples", a->samples, "light samples a pixel, 16 ... 1024")->capture_default_str();
     command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();

@@ -19,10 +19,10 @@ namespace prolate::cli {
 namespace {
 
 constexpr const char* kFooter = R"(
-The proof knows nothing of how the tree was made. Exit code 0: every level covers; 1: some level does not, or it
-could not be proved. The mesh is taken from its file as when the tree was baked: same unit, scale, local origin and weld,
-unless other ones are given. An open mesh has no inside; then only its triangles are proved. An exact tree must hold the mesh's
-triangles, each in one leaf, and in every ellipsoid above it.
+The proof uses only the tree's file and the mesh. Exit code 0: every level covers. 1: some level does not, or it
+could not be proved. The mesh is read as when the tree was baked, with the same unit, scale, local origin and weld
+tolerance, unless you give others. An open mesh has no certain inside, so only its triangles are proved to be
+covered. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it.
 
 Examples:
   prolate verify horse.etree horse.obj
@@ -83,7 +83,7 @@ std::string as_text(const VerifyReport& report) {
             fmt::format("node {}: its bounding volume does NOT hold all ellipsoids below it, so queries may miss them; "
                         "bake again\n",
                         report.unbounded_node);
-    if (report.surface_mode) out += "surface mode: the mesh is open, so its triangles were proved and no inside\n";
+    if (report.surface_mode) out += "surface mode: the mesh is open, so the proof is about its triangles only\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;
 }

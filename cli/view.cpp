@@ -25,12 +25,14 @@ namespace prolate::cli {
 namespace {
 
 constexpr const char* kFooter = R"(
-One or two trees, each followed by the mesh that it was baked from, if you have it. The mesh is shown with the tree, and
-tells how far ellipsoids stick out; an exact tree brings its own. The page is one file that needs no network and no
-server, and sends nothing anywhere. It needs a browser with WebGL 2, as all have had since 2021. Press ? in it for help.
+Give one or two trees, each followed by the mesh that it was baked from, if you have it. The page shows the mesh
+with the tree, and how far the ellipsoids stick out of it; an exact tree brings its own mesh. The page is a single
+file that needs no network and no server, and sends nothing anywhere. It needs a browser with WebGL 2, as all have
+had since 2021. Press ? in it for help.
 
-With two trees, one body can be dragged against the other. Verdict, distance, nearest points and counts come from
-prolate's own runtime, compiled to WebAssembly; it is part of a command that was built where emscripten was installed.
+With two trees, you can drag one body against the other. The verdict, the distance, the nearest points and the
+counts come from prolate's own runtime, compiled to WebAssembly; this needs a command that was built where
+emscripten was installed.
 
 Examples:
   prolate view horse.etree horse.obj -o horse.html
@@ -162,7 +164,7 @@ Outcome<ExitCode> run(ViewArguments& a) {
 
 void add_view(CLI::App& app, Work& chosen) {
     auto a = std::make_shared<ViewArguments>();
-    CLI::App* command = app.add_subcommand("view", "Make a page to look at trees, and to collide two, in a browser");
+    CLI::App* command = app.add_subcommand("view", "Make a page that shows trees in a browser, and collides two");
     command->add_option("files", a->files, "one or two .etree files, each with its mesh after it")
         ->required()
         ->type_name("TREE [MESH] [TREE [MESH]]");

@@ -91,7 +91,7 @@ void declare_asset_options(CLI::App& app, Asset& a) {
                    "join vertices of open edges within this length, if that closes the mesh (default: 8 float steps)");
     app.add_option("--degree", a.options.degree, "children of a node, 2 ... 64")->capture_default_str();
     app.add_option("--levels", a.levels, "levels below the root, 1 ... 31");
-    app.add_option("--ellipsoids", a.ellipsoids, "number of leaves, 1 ... 65536: the best set of so many");
+    app.add_option("--ellipsoids", a.ellipsoids, "number of leaves, 1 ... 65536: the best set of that many");
     app.add_option("--tolerance", a.tolerance, "outside volume of the leaves / volume of the solid, above 0");
     app.add_option("--distance", a.distance,
                    "largest distance of the leaves from the solid, % of the diagonal, above 0");
@@ -100,12 +100,12 @@ void declare_asset_options(CLI::App& app, Asset& a) {
     app.add_option("--alpha", a.options.alpha, "weight of the surface error")->capture_default_str();
     app.add_option("--beta", a.options.beta, "weight of the outside volume")->capture_default_str();
     app.add_option("--quality", a.quality, "fast, normal or best")->capture_default_str();
-    app.add_flag("--exact", a.options.exact, "keep the triangles, in the leaves: queries answer as they do");
+    app.add_flag("--exact", a.options.exact, "store the triangles in the leaves: queries answer for them");
     app.add_option("--leaf-triangles", a.options.leaf_triangles, "most triangles in a leaf, 1 ... 127; with --exact")
         ->capture_default_str();
     app.add_option("-j,--threads", a.options.threads, "0 = all cores; the result does not depend on it")
         ->capture_default_str();
-    app.add_option("--seed", a.options.seed, "of all that is drawn at random")->capture_default_str();
+    app.add_option("--seed", a.options.seed, "of the random numbers")->capture_default_str();
     app.add_option("--report", a.report, "also write all figures to this JSON file");
 }
 
@@ -172,7 +172,8 @@ Outcome<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cac
     auto baked = make(a, cache, rebake, label);
     if (!baked) return baked;
     if (!baked->tree.view().bake_info().goal_reached)
-        note(a.mesh, "the asked number, tolerance or distance was not reached at this resolution; try --quality best");
+        note(a.mesh,
+             "the number, tolerance or distance asked for was not reached at this resolution; try --quality best");
     cache.keep(baked->tree.view(), baked->source == Source::baked);
     if (baked->source == Source::unchanged) {
         // For make and its like, which go by dates. Whose file it is not may not do so, and loses nothing but that.

@@ -43,7 +43,7 @@ Outcome<Json> read_json(const std::string& path) {
     } catch (const Json::exception& e) {
         std::string what = e.what(); // "[json.exception...] parse error at line 3, column 1: ..."
         if (const size_t at = what.find("] "); at != what.npos) what.erase(0, at + 2);
-        return Failure{kBadInput, path, "is no JSON: " + what, kAdvice};
+        return Failure{kBadInput, path, "is not JSON: " + what, kAdvice};
     }
 }
 

@@ -213,7 +213,7 @@ TEST_F(Cli, OneTriangleIsALegalOpenMesh) {
     const Outcome o = run({"bake", file("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "-o", file("one.etree"),
                            "--levels", "1", "--quality", "fast"});
     EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_NE(o.err.find("3 open edges: no inside can be promised, surface mode"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("3 open edges: no inside can be promised"), std::string::npos) << o.err;
     EXPECT_EQ(run({"verify", file("one.etree"), file("one.obj")}).code, 0);
     EXPECT_NE(run({"info", file("one.etree")}).out.find("surface mode"), std::string::npos);
 }
@@ -625,7 +625,7 @@ TEST_F(Cli, ABadManifestIsRefusedAsAWhole) {
         const std::string path = file("assets.json", text);
         expect_failure(run({"bake", "--manifest", path}), code, path, words);
     };
-    refuse("", 3, "is no JSON");
+    refuse("", 3, "is not JSON");
     refuse(R"({"assets": [})", 3, "line 1");
     refuse(R"([])", 3, R"(must be an object with an array "assets")");
     refuse(R"({"assets": {}})", 3, R"(must be an object with an array "assets")");
