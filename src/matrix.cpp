@@ -63,13 +63,13 @@ Result<Pose> pose_from_matrix(const Matrix4& matrix) noexcept {
         for (size_t j = i; j < 3; ++j) {
             const double dot = m[0][i] * m[0][j] + m[1][i] * m[1][j] + m[2][i] * m[2][j];
             if (!(std::abs(dot - (i == j ? 1 : 0)) <= kRigidTolerance))
-                return bad(i == j ? "the matrix scales: a pose can only turn and move" //
-                                  : "the matrix shears: a pose can only turn and move");
+                return bad(i == j ? "the matrix scales: a pose only rotates and moves"
+                                  : "the matrix shears: a pose only rotates and moves");
         }
     const double determinant = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
                                m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                                m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-    if (determinant < 0) return bad("the matrix mirrors: a pose can only turn and move");
+    if (determinant < 0) return bad("the matrix mirrors: a pose only rotates and moves");
     Pose pose;
     float* const translation[3] = {&pose.translation.x, &pose.translation.y, &pose.translation.z};
     for (size_t i = 0; i < 3; ++i) {

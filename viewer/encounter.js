@@ -65,8 +65,7 @@ export class Encounter {
       bar.max = most;
       bar.value = level.own;
       bar.setAttribute('aria-hidden', 'true');
-      const verdict = {separated: 'apart', overlapping: 'meet', undecided: '?'}[level.verdict];
-      for (const content of [String(l), grouped(level.own), bar, verdict]) row.insertCell().append(content);
+      for (const content of [String(l), grouped(level.own), bar, level.verdict]) row.insertCell().append(content);
       return row;
     }));
   }

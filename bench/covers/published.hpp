@@ -1,4 +1,4 @@
-// Outside ratios that others have published for models that are known here.
+// Outside ratios that other methods reach on models that are known here, and those that prolate is to reach.
 #pragma once
 
 #include "bench/covers/measure.hpp"
@@ -9,7 +9,7 @@
 
 namespace prolate::bench {
 
-/// From prolate's design figures, section "Figures to beat" (exact columns). NaN: none.
+/// Outside ratios of one model at one count, by exact columns. NaN: none.
 struct Published {
     const char* model;
     uint32_t triangles, count;

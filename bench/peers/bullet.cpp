@@ -135,7 +135,7 @@ public:
         const btCollisionObjectWrapper wb(nullptr, b_.getCollisionShape(), &b_, b_.getWorldTransform(), -1, -1);
         Counter counter(&wa, &wb);
         algorithm_->processCollision(&wa, &wb, info_, &counter);
-        return counter.contacts > 0 ? Contact::meeting : Contact::apart;
+        return counter.contacts > 0 ? Contact::meeting : Contact::separated;
     }
 
 private:

@@ -49,7 +49,8 @@ public:
     }
     Contact collide(size_t i) override {
         coal::CollisionResult result;
-        return coal::collide(&a_, a_at_[i], &b_, b_at_[i], request_, result) > 0 ? Contact::meeting : Contact::apart;
+        return coal::collide(&a_, a_at_[i], &b_, b_at_[i], request_, result) > 0 ? Contact::meeting
+                                                                                 : Contact::separated;
     }
     double distance(size_t i) override {
         coal::DistanceResult result;

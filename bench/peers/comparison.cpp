@@ -102,7 +102,7 @@ const std::vector<Placement>& Comparison::poses(const Subject& subject) {
         const Library& library = *libraries_for(subject).front();
         const Shape *a = shape(subject.a, library), *b = shape(subject.b, library);
         const auto meets = [&](const Placement& p) {
-            return library.place(*a, *b, {&p, 1})->collide(0) != Contact::apart;
+            return library.place(*a, *b, {&p, 1})->collide(0) != Contact::separated;
         };
         at->second = make_poses(meets, options_.poses, options_.seed, aligned);
     }
@@ -136,10 +136,10 @@ std::vector<double> Comparison::expected_distances(const Subject& subject,
 // What the poses were made for; after a move the reference has to tell.
 std::vector<Contact> Comparison::expected_contacts(const Subject& subject) {
     const auto& at = poses(subject);
-    std::vector<Contact> out(at.size(), subject.kind.starts_with("touching") ? Contact::meeting : Contact::apart);
+    std::vector<Contact> out(at.size(), subject.kind.starts_with("touching") ? Contact::meeting : Contact::separated);
     if (subject.query == Query::again)
         for (size_t i = 0; i < at.size(); ++i)
-            out[i] = reference_meets(subject, at[i]) ? Contact::meeting : Contact::apart;
+            out[i] = reference_meets(subject, at[i]) ? Contact::meeting : Contact::separated;
     return out;
 }
 
@@ -159,7 +159,7 @@ void Comparison::judge(const Subject& subject, Scene& scene, const Truth& truth,
         } else {
             const Contact now = scene.collide(i), expected = truth.contacts[i];
             if (now == expected) continue;
-            const bool inside = now == Contact::enclosed && expected == Contact::apart;
+            const bool inside = now == Contact::enclosed && expected == Contact::separated;
             enclosed += inside, outcome.wrong += !inside, missed += !inside && expected == Contact::meeting;
         }
     }

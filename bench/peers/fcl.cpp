@@ -56,7 +56,7 @@ public:
     }
     Contact collide(size_t i) override {
         fcl::CollisionResult<double> result;
-        return fcl::collide(&a_, a_at_[i], &b_, b_at_[i], request_, result) > 0 ? Contact::meeting : Contact::apart;
+        return fcl::collide(&a_, a_at_[i], &b_, b_at_[i], request_, result) > 0 ? Contact::meeting : Contact::separated;
     }
     double distance(size_t i) override {
         fcl::DistanceResult<double> result;

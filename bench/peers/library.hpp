@@ -19,7 +19,7 @@ namespace prolate::bench::peers {
 
 /// Answer to "do they meet?". `enclosed`: the surfaces do not, but a part of one solid lies inside the other, which
 /// only prolate sees.
-enum class Contact : uint8_t { apart, meeting, enclosed };
+enum class Contact : uint8_t { separated, meeting, enclosed };
 
 /// What one query looked at; empty where the library does not tell.
 struct Work {

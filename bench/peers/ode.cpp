@@ -57,7 +57,7 @@ public:
     Contact collide(size_t i) override {
         move(a_, a_at_[i]), move(b_, b_at_[i]);
         dContactGeom contact;
-        return dCollide(a_, b_, 1, &contact, sizeof contact) > 0 ? Contact::meeting : Contact::apart;
+        return dCollide(a_, b_, 1, &contact, sizeof contact) > 0 ? Contact::meeting : Contact::separated;
     }
 
 private:

@@ -30,7 +30,7 @@ public:
     ProlateScene(TreeView a, TreeView b, std::span<const Placement> poses) : a_(a), b_(b), poses_(poses) {}
     Contact collide(size_t i) override {
         const CollideResult result = query(i);
-        if (result.verdict == Verdict::separated) return Contact::apart;
+        if (result.verdict == Verdict::separated) return Contact::separated;
         return result.enclosed ? Contact::enclosed : Contact::meeting;
     }
     double distance(size_t i) override { return distance_query(i).upper; }
