@@ -19,14 +19,18 @@ namespace {
 constexpr const char* kFooter = R"(
 The goal is --levels, --ellipsoids, a closeness (--tolerance, --distance or both) or --exact. Give at most one; the
 default is 3 levels. For a closeness, the tree gets as few leaves as reach it, more where the shape needs more: the
-cover then sticks out of the solid by no more than that volume and that distance. With --exact, the tree goes down
-to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover the surface only, and queries
-answer for the triangles. 100,000 triangles take about a second, whatever the quality. Coordinates are taken from
-the file, as metres unless --unit or --scale says otherwise. The unit that a 3MF states is applied; that of a DAE is
-only reported. The tree stores scale and local origin, and answers of queries are relative to it. Vertices that
-nearly meet are joined if that closes the mesh (--weld 0: never), and the cover holds them where they were. Closed
-parts that are inside out are reversed. The same mesh and options give the same bytes. An open mesh has no certain
-inside. It is baked in surface mode, in which only the cover of its triangles is certain.
+cover then sticks out of the solid by no more than that volume and that distance.
+
+With --exact, the tree goes down to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover
+the surface only, and queries answer for the triangles. 100,000 triangles take about a second, whatever the quality.
+
+Coordinates are taken from the file, as metres unless --unit or --scale says otherwise. The unit that a 3MF states
+is applied; that of a DAE is only reported. The tree stores scale and local origin, and answers of queries are
+relative to it. Vertices that nearly meet are joined if that closes the mesh (--weld 0: never), and the cover holds
+them where they were. Closed parts that are inside out are reversed. The same mesh and options give the same bytes.
+
+An open mesh has no certain inside. It is baked in surface mode, in which only the cover of its triangles is
+certain.
 
 Nothing is baked twice. If the output already is what this mesh and these options make, only its date is renewed
 ("unchanged"). A folder named by --cache, or by the environment variable PROLATE_CACHE, keeps every tree for later
