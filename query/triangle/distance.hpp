@@ -30,7 +30,7 @@ struct TriangleDistance {
     // direction.
     glm::dvec3 normal{0, 0, 0};
 };
-/// With the same margin, `lower` is positive only if separated() of triangle.hpp holds, and always if it does. The
+/// With the same margin, `lower` is positive only if separated() of separation.hpp holds, and always if it does. The
 /// margin is a parameter only so that the tests can show that wrong ones are caught.
 TriangleDistance distance(const PlacedTriangle& a, const PlacedTriangle& b, double margin = kSeparationMargin) noexcept;
 /// A lower bound from one direction n, of length 1 but for rounding, pointing from A to B.

@@ -57,6 +57,7 @@ function(prose out file line)
   elseif(file MATCHES "\\.md$")
     set(mark "")
   else()
+    string(REGEX REPLACE "\"[^\"]*\"" "" line "${line}") # a string's # begins no comment
     set(mark "# ")
   endif()
   set(${out} "" PARENT_SCOPE)
