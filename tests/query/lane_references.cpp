@@ -23,7 +23,7 @@ float entry_sum(const LaneNode& e) {
 // |L^T n|
 float width(const LaneNode& e, float x, float y, float z) {
     const float along[3] = {dot(e.l11, e.l21, e.l31, x, y, z), e.l22 * y + e.l32 * z, e.l33 * z};
-    return std::sqrt(along[0] * along[0] + along[1] * along[1] + along[2] * along[2]);
+    return std::sqrt(sum_of_squares(along[0], along[1], along[2]));
 }
 
 float size_of(const LaneNode& e) {
@@ -31,35 +31,38 @@ float size_of(const LaneNode& e) {
     return std::sqrt(xx + yy + dot(e.l31, e.l32, e.l33, e.l31, e.l32, e.l33));
 }
 
-} // namespace
-
-LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& s) {
-    const LaneNode e = load_node(block, lane, step_exponent);
-    const auto dot = [](float x, float y, float z, float u, float v, float w) { return x * u + y * v + z * w; };
+// The direction n = adj(Q) r of query/node/lanes-inl.hpp, r, and |L2|.
+struct Proposal {
+    float n[3], r[3], size;
+};
+Proposal propose(const LaneNode& e, const Single& s) {
     const float xx = e.l11 * e.l11, yx = e.l21 * e.l11, zx = e.l31 * e.l11;
     const float yy = e.l21 * e.l21 + e.l22 * e.l22, zy = e.l31 * e.l21 + e.l32 * e.l22;
-    const float zz = dot(e.l31, e.l32, e.l33, e.l31, e.l32, e.l33);
-    LaneGap out{};
-    out.size = std::sqrt(xx + yy + zz);
-    const float w2 = 1 / (out.size * (out.size + s.size)), w1 = out.size * w2 * s.weight;
-    const auto mix = [&](float q1, float q2) { return w1 * q1 + w2 * q2; };
+    const float zz = dot(e.l31, e.l32, e.l33, e.l31, e.l32, e.l33), size = size_of(e);
+    const float w2 = 1 / (size * (size + s.size)), weight = size * w2 * s.weight;
+    const auto mix = [&](float q1, float q2) { return weight * q1 + w2 * q2; };
     const float qxx = mix(s.diagonal[0], xx), qyy = mix(s.diagonal[1], yy), qzz = mix(s.diagonal[2], zz);
     const float qyz = mix(s.off_diagonal[1], zy), qxz = mix(s.off_diagonal[2], zx), qxy = mix(s.off_diagonal[0], yx);
     const float rx = e.center[0] - s.center[0], ry = e.center[1] - s.center[1], rz = e.center[2] - s.center[2];
     const float axx = qyy * qzz - qyz * qyz, ayy = qxx * qzz - qxz * qxz, azz = qxx * qyy - qxy * qxy;
     const float axy = qxz * qyz - qxy * qzz, axz = qxy * qyz - qxz * qyy, ayz = qxy * qxz - qxx * qyz;
-    const float x = dot(axx, axy, axz, rx, ry, rz), y = dot(axy, ayy, ayz, rx, ry, rz),
-                z = dot(axz, ayz, azz, rx, ry, rz);
+    return {{dot(axx, axy, axz, rx, ry, rz), dot(axy, ayy, ayz, rx, ry, rz), dot(axz, ayz, azz, rx, ry, rz)},
+            {rx, ry, rz},
+            size};
+}
+
+} // namespace
+
+LaneGap lane_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const Single& s) {
+    const LaneNode e = load_node(block, lane, step_exponent);
+    const auto [n, r, size] = propose(e, s);
+    const float x = n[0], y = n[1], z = n[2];
     const auto along = [&](size_t c) { return dot(s.factor[c][0], s.factor[c][1], s.factor[c][2], x, y, z); };
-    const float a1 = along(0), a2 = along(1), a3 = along(2);
-    const float b1 = dot(e.l11, e.l21, e.l31, x, y, z), b2 = e.l22 * y + e.l32 * z, b3 = e.l33 * z;
-    const float a = std::sqrt(a1 * a1 + a2 * a2 + a3 * a3), b = std::sqrt(b1 * b1 + b2 * b2 + b3 * b3);
-    const float p = dot(x, y, z, rx, ry, rz), sum = a + b, length = std::abs(x) + std::abs(y) + std::abs(z);
-    out.gap = p - sum - (s.slack + kLaneMargin * out.size) * length;
-    out.square = x * x + y * y + z * z;
-    out.depth = p / sum;
-    if (!(length > kLaneDirection)) out.gap = 0;
-    return out;
+    const float a = std::sqrt(sum_of_squares(along(0), along(1), along(2)));
+    const float p = dot(x, y, z, r[0], r[1], r[2]), sum = a + width(e, x, y, z);
+    const float length = std::abs(x) + std::abs(y) + std::abs(z);
+    const float gap = p - sum - (s.slack + kLaneMargin * size) * length;
+    return {length > kLaneDirection ? gap : 0, sum_of_squares(x, y, z), p / sum, size};
 }
 
 float hull_reach(const std::byte* hull, const float (&v)[3], float width) {
@@ -139,23 +142,12 @@ float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, co
 
 ShapeGap shape_gap(const std::byte* block, uint32_t lane, int32_t step_exponent, const LaneRoundedBox& box) {
     const LaneNode e = load_node(block, lane, step_exponent);
-    const Single& s = box.single;
-    const float xx = e.l11 * e.l11, yx = e.l21 * e.l11, zx = e.l31 * e.l11;
-    const float yy = e.l21 * e.l21 + e.l22 * e.l22, zy = e.l31 * e.l21 + e.l32 * e.l22;
-    const float zz = dot(e.l31, e.l32, e.l33, e.l31, e.l32, e.l33), size = size_of(e);
-    const float w2 = 1 / (size * (size + s.size)), weight = size * w2 * s.weight;
-    const auto mix = [&](float q1, float q2) { return weight * q1 + w2 * q2; };
-    const float qxx = mix(s.diagonal[0], xx), qyy = mix(s.diagonal[1], yy), qzz = mix(s.diagonal[2], zz);
-    const float qyz = mix(s.off_diagonal[1], zy), qxz = mix(s.off_diagonal[2], zx), qxy = mix(s.off_diagonal[0], yx);
-    const float rx = e.center[0] - s.center[0], ry = e.center[1] - s.center[1], rz = e.center[2] - s.center[2];
-    const float axx = qyy * qzz - qyz * qyz, ayy = qxx * qzz - qxz * qxz, azz = qxx * qyy - qxy * qxy;
-    const float axy = qxz * qyz - qxy * qzz, axz = qxy * qyz - qxz * qyy, ayz = qxy * qxz - qxx * qyz;
-    const float x = dot(axx, axy, axz, rx, ry, rz), y = dot(axy, ayy, ayz, rx, ry, rz),
-                z = dot(axz, ayz, azz, rx, ry, rz);
+    const auto [n, r, size] = propose(e, box.single);
+    const float x = n[0], y = n[1], z = n[2];
     const auto along = [&](const float(&edge)[3]) { return std::abs(dot(edge[0], edge[1], edge[2], x, y, z)); };
     const float edges = along(box.edges[0]) + along(box.edges[1]) + along(box.edges[2]);
-    const float round = box.radius * std::sqrt(x * x + y * y + z * z);
-    const float p = dot(x, y, z, rx, ry, rz), sum = width(e, x, y, z) + (edges + round);
+    const float round = box.radius * std::sqrt(sum_of_squares(x, y, z));
+    const float p = dot(x, y, z, r[0], r[1], r[2]), sum = width(e, x, y, z) + (edges + round);
     const float length = std::abs(x) + std::abs(y) + std::abs(z);
     const float gap = p - sum - (box.slack + kLaneMargin * size) * length;
     return {length > kLaneDirection ? gap : 0, p / sum};
