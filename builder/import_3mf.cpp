@@ -1,7 +1,10 @@
 // Reads 3MF through lib3mf: what the build places, with components and transforms. Its unit is part of the format, so
 // coordinates become metres.
 //
-// Known limit: beam lattices are no triangles; a file that has one is refused.
+// Known limits: beam lattices are no triangles; a file that has one is refused. lib3mf 1.8 itself looks at components
+// within components once for every way that leads to them, and cannot be stopped: of groups that each hold the one
+// before twice, it takes seconds from 24 on.
+#include "builder/job.hpp"
 #include "builder/polygons.hpp"
 
 #include <Model/COM/NMR_DLLInterfaces.h>
@@ -49,10 +52,11 @@ Affine affine(const MODELTRANSFORM& t) {
 struct Part {
     Handle object;
     Affine transform;
-    unsigned depth;
+    unsigned depth = 0;
 };
 
-constexpr unsigned kMostDepth = 100; // components within components
+constexpr unsigned kMostDepth = 100;      // components within components
+constexpr size_t kMostParts = 10'000'000; // a few lines can ask for 2^100 of them
 
 void add_mesh(Polygons& out, PLib3MFBase* object, const Affine& transform) {
     DWORD beams = 0, vertices = 0, triangles = 0;
@@ -99,6 +103,51 @@ void add_unit(Polygons& out, PLib3MFBase* model) {
     out.notes.push_back(std::string("states ") + kUnits[unit].second + ": made metres; z is up, the axes are kept");
 }
 
+// Appends all meshes of a build item: an object may be a group of others.
+class ItemReader {
+public:
+    explicit ItemReader(Polygons& out) : out_(out) {}
+
+    void read(PLib3MFBase* item) {
+        Part whole;
+        whole.transform = placed(item, lib3mf_builditem_hasobjecttransform, lib3mf_builditem_getobjecttransform);
+        need(lib3mf_builditem_getobjectresource(item, whole.object.out()));
+        todo_.push_back(std::move(whole));
+        while (!todo_.empty()) {
+            checkpoint();
+            const Part part = std::move(todo_.back());
+            todo_.pop_back();
+            if (part.depth > kMostDepth) throw Error{ErrorCode::bad_file, "components nested too deeply"};
+            if (++parts_ > kMostParts) throw Error{ErrorCode::bad_file, "more than 10 million components"};
+            BOOL is_mesh = false, is_group = false;
+            need(lib3mf_object_ismeshobject(part.object.get(), &is_mesh));
+            if (is_mesh) add_mesh(out_, part.object.get(), part.transform);
+            need(lib3mf_object_iscomponentsobject(part.object.get(), &is_group));
+            if (is_group) push_components(part);
+        }
+    }
+
+private:
+    void push_components(const Part& group) {
+        DWORD count = 0;
+        need(lib3mf_componentsobject_getcomponentcount(group.object.get(), &count));
+        for (DWORD i = count; i-- > 0;) {
+            Handle component;
+            need(lib3mf_componentsobject_getcomponent(group.object.get(), i, component.out()));
+            Part child;
+            child.transform =
+                group.transform * placed(component.get(), lib3mf_component_hastransform, lib3mf_component_gettransform);
+            child.depth = group.depth + 1;
+            need(lib3mf_component_getobjectresource(component.get(), child.object.out()));
+            todo_.push_back(std::move(child));
+        }
+    }
+
+    Polygons& out_;
+    std::vector<Part> todo_;
+    size_t parts_ = 0;
+};
+
 Result<Polygons> read(std::string_view bytes, std::string& detail) {
     Handle model, reader, items;
     need(lib3mf_createmodel(model.out()));
@@ -114,36 +163,11 @@ Result<Polygons> read(std::string_view bytes, std::string& detail) {
     out.place_word = "triangle";
     add_unit(out, model.get());
     need(lib3mf_model_getbuilditems(model.get(), items.out()));
+    ItemReader item_reader(out);
     for (BOOL more = false; lib3mf_builditemiterator_movenext(items.get(), &more) == LIB3MF_OK && more;) {
         Handle item;
         need(lib3mf_builditemiterator_getcurrent(items.get(), item.out()));
-        std::vector<Part> todo(1);
-        todo[0].transform =
-            placed(item.get(), lib3mf_builditem_hasobjecttransform, lib3mf_builditem_getobjecttransform);
-        todo[0].depth = 0;
-        need(lib3mf_builditem_getobjectresource(item.get(), todo[0].object.out()));
-        while (!todo.empty()) {
-            const Part part = std::move(todo.back());
-            todo.pop_back();
-            if (part.depth > kMostDepth) return Error{ErrorCode::bad_file, "components nested too deeply"};
-            BOOL is_mesh = false, is_group = false;
-            need(lib3mf_object_ismeshobject(part.object.get(), &is_mesh));
-            if (is_mesh) add_mesh(out, part.object.get(), part.transform);
-            need(lib3mf_object_iscomponentsobject(part.object.get(), &is_group));
-            if (!is_group) continue;
-            DWORD count = 0;
-            need(lib3mf_componentsobject_getcomponentcount(part.object.get(), &count));
-            for (DWORD i = count; i-- > 0;) {
-                Handle component;
-                need(lib3mf_componentsobject_getcomponent(part.object.get(), i, component.out()));
-                Part child;
-                child.transform = part.transform *
-                                  placed(component.get(), lib3mf_component_hastransform, lib3mf_component_gettransform);
-                child.depth = part.depth + 1;
-                need(lib3mf_component_getobjectresource(component.get(), child.object.out()));
-                todo.push_back(std::move(child));
-            }
-        }
+        item_reader.read(item.get());
     }
     return out;
 }

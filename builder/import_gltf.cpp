@@ -178,8 +178,9 @@ private:
                       s = read("SCALE", Rows::vec3);
         if (!count) attributes.fail("instances without a translation, rotation or scale");
         const auto row = [](const Numbers& rows, size_t i, const Numbers& otherwise) {
+            if (rows.empty()) return otherwise;
             const auto from = rows.begin() + static_cast<ptrdiff_t>(i * otherwise.size());
-            return rows.empty() ? otherwise : Numbers(from, from + static_cast<ptrdiff_t>(otherwise.size()));
+            return Numbers(from, from + static_cast<ptrdiff_t>(otherwise.size()));
         };
         std::vector<Affine> out;
         for (size_t i = 0; i < *count; ++i)
