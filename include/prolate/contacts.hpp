@@ -60,9 +60,8 @@ struct ContactResult {
 ///
 /// Every pair of leaves, or of triangles, that meets gives a patch of points with one normal:
 ///  - Of two ellipsoids: one point, along the shortest translation that separates them.
-///  - Of two triangles: the normal is that of one of the triangles, or the product of two edges, whichever direction
-///  has
-///    the least overlap of the triangles *and their neighbourhoods*. So edges and vertices count only in directions in
+///  - Of two triangles: the normal is that of one of the triangles, or the product of two edges, whichever has the
+///    least overlap of the triangles *and their neighbourhoods*. So edges and vertices count only in directions in
 ///    which no surface rises from them: inner edges of flat ground give no normals of their own, convex edges give
 ///    those between the normals of their faces, concave edges those of their faces. The points are the corners of the
 ///    intersection of the two triangles, seen along the normal, and each body's deepest vertex in the neighbourhood.

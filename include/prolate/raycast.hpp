@@ -2,13 +2,12 @@
 //
 // query.hpp says what the verdicts certify, the ray in the place of the second body:
 //  - separated:   no point of the ray lies in a leaf ellipsoid of a tree without triangles, or on a triangle of an
-//  exact
-//                 tree, or within the margin of it.
+//                 exact tree, or within the margin of one.
 //  - overlapping: the ray meets a leaf ellipsoid or a triangle, or passes so close that rounding hides the gap (about
 //                 1e-12 of the lengths involved: the body's size and the distance of the ray's origin). So a ray never
 //                 slips through an edge or a vertex, and a ray in the plane of a triangle meets it at its rim.
 //  - undecided:   the budget ran out before a hit was found, or the pose or the ray is not finite, or the direction is
-//  0.
+//                 0.
 // Exact trees are hit at their triangles only, from either side, wherever the ray begins.
 #pragma once
 
