@@ -19,7 +19,7 @@ std::string text_of(const xml_node& element) {
 uint64_t count_of(const xml_node& element, const char* attribute, std::optional<uint64_t> otherwise) {
     const pugi::xml_attribute found = element.attribute(attribute);
     const auto value = found ? number<uint64_t>(found.value()) : otherwise;
-    if (!value) fail(element, "a count that is missing, or no number");
+    if (!value) fail(element, "a count that is missing or not a number");
     return *value;
 }
 

@@ -56,7 +56,7 @@ private:
         width_ = 1;
         for (const xml_node& input : element.children("input")) {
             const uint64_t offset = count_of(input, "offset", 0);
-            if (offset >= kMostInputs) fail(input, "an offset that makes no sense");
+            if (offset >= kMostInputs) fail(input, "an offset out of range");
             width_ = std::max(width_, static_cast<size_t>(offset) + 1);
             if (std::string_view(input.attribute("semantic").value()) != "VERTEX") continue;
             vertices = document_.target(input, "source", "vertices");

@@ -139,7 +139,7 @@ double number_at(const std::byte* from, uint64_t component, bool normalised) {
 // ---- values ----
 
 bool GltfValue::has(const char* member) const {
-    if (!json_->is_object()) fail("a value that is no object");
+    if (!json_->is_object()) fail("a value that is not an object");
     return json_->contains(member);
 }
 
@@ -150,7 +150,7 @@ GltfValue GltfValue::operator[](const char* member) const {
 }
 
 uint64_t GltfValue::size() const {
-    if (!json_->is_array()) fail("a value that is no list");
+    if (!json_->is_array()) fail("a value that is not a list");
     return json_->size();
 }
 
@@ -163,12 +163,12 @@ uint64_t GltfValue::whole() const {
     constexpr double kMost = 0x1p53;
     const double value = json_->is_number() ? json_->get<double>() : -1;
     if (!(value >= 0 && value <= kMost && value == std::floor(value)))
-        fail("a value that is no whole number from 0 to 2^53");
+        fail("a value that is not a whole number from 0 to 2^53");
     return static_cast<uint64_t>(value);
 }
 
 double GltfValue::number() const {
-    if (!json_->is_number() || !std::isfinite(json_->get<double>())) fail("a value that is no number");
+    if (!json_->is_number() || !std::isfinite(json_->get<double>())) fail("a value that is not a number");
     return json_->get<double>();
 }
 
@@ -178,7 +178,7 @@ bool GltfValue::truth() const {
 }
 
 const std::string& GltfValue::text() const {
-    if (!json_->is_string()) fail("a value that is no text");
+    if (!json_->is_string()) fail("a value that is not a string");
     return json_->get_ref<const std::string&>();
 }
 

@@ -276,7 +276,7 @@ private:
             const auto found = nodes_.find(parent);
             if (found == nodes_.end())
                 throw Error{ErrorCode::bad_file,
-                            "a node whose parent is no object; export the scene without animation"};
+                            "a node whose parent is not an object; export the scene without animation"};
             if (steps > nodes_.size()) throw Error{ErrorCode::bad_file, "a node that is below itself"};
             out = found->second.to_parent * out;
             parent = found->second.parent;

@@ -61,7 +61,7 @@ constexpr size_t kMostParts = 10'000'000; // a few lines can ask for 2^100 of th
 void add_mesh(Polygons& out, PLib3MFBase* object, const Affine& transform) {
     DWORD beams = 0, vertices = 0, triangles = 0;
     need(lib3mf_meshobject_getbeamcount(object, &beams));
-    if (beams > 0) throw Error{ErrorCode::bad_file, "a beam lattice, which is no mesh; export it as triangles"};
+    if (beams > 0) throw Error{ErrorCode::bad_file, "a beam lattice, which is not a mesh; export it as triangles"};
     need(lib3mf_meshobject_getvertexcount(object, &vertices));
     need(lib3mf_meshobject_gettrianglecount(object, &triangles));
     if (!out.can_hold(vertices)) throw Error{ErrorCode::bad_file, "too many vertices (2^32 or more)"};

@@ -62,7 +62,7 @@ Affine transform_of(const xml_node& element) {
     const std::string_view name = element.name();
     const auto values = [&element](size_t count) {
         auto out = numbers_of<double>(element, "a transform that is not numbers");
-        if (out.size() != count) fail(element, "a transform of another number of numbers than it needs");
+        if (out.size() != count) fail(element, "a transform with the wrong number of numbers");
         return out;
     };
     Affine out;

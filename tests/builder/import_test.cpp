@@ -316,7 +316,7 @@ TEST_F(Import, HostileDaeIsRefusedByPlaceAndName) {
     refuse(R"(name="Y")", R"(name="T")", "without X, Y and Z");
     refuse(R"(semantic="VERTEX")", R"(semantic="NORMAL")", "without vertices");
     refuse(R"(semantic="POSITION")", R"(semantic="NORMAL")", "without positions");
-    refuse(R"(source="#v" offset="0")", R"(source="#v" offset="4000000000")", "makes no sense");
+    refuse(R"(source="#v" offset="0")", R"(source="#v" offset="4000000000")", "offset out of range");
     refuse(R"(source="#v" offset="0")", R"(source="#v" offset="8")", "ends within a corner");
     refuse(R"(<triangles count="4">)", R"(<triangles count="4000000000">)", "another number");
     refuse(R"(url="#s")", R"(url="#g")", "does not exist");
