@@ -305,8 +305,8 @@ TEST_F(Import, HostileDaeIsRefusedByPlaceAndName) {
           R"(source="#pa" count="4" stride="18446744073709551615")",
           R"(source="#pa" count="4" stride="3" offset="18446744073709551615")"})
         refuse(accessor, beyond, "reaches beyond its array line 6, <accessor>");
-    refuse(accessor, R"(source="#pa" count="1e39" stride="3")", "no number");
-    refuse(accessor, R"(source="#pa" count="-4" stride="3")", "no number");
+    refuse(accessor, R"(source="#pa" count="1e39" stride="3")", "not a number");
+    refuse(accessor, R"(source="#pa" count="-4" stride="3")", "not a number");
     refuse(accessor, R"(source="#pa" stride="3")", "missing");
     refuse(accessor, R"(source="#nowhere" count="4" stride="3")", "does not exist");
     refuse(accessor, R"(source="other.dae#pa" count="4" stride="3")", "another file");
@@ -331,7 +331,7 @@ TEST_F(Import, HostileDaeIsRefusedByPlaceAndName) {
     refuse_nodes(R"(<node id="a"><instance_node url="#a"/></node>)", "in a circle line 11, <instance_node>");
     refuse_nodes(R"(<node id="a"><node id="b"><instance_node url="#a"/><instance_node url="#a"/></node></node>)",
                  "in a circle");
-    refuse_nodes(R"(<node><translate>1 2</translate></node>)", "another number of numbers");
+    refuse_nodes(R"(<node><translate>1 2</translate></node>)", "wrong number of numbers");
     refuse_nodes(R"(<node><matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1</matrix></node>)", "perspective");
     refuse_nodes(R"(<node><skew>45 0 1 0 1 0 0</skew></node>)", "a skew");
     refuse_nodes(R"(<node><instance_geometry url="b.dae#g"/></node>)", "another file");
@@ -802,7 +802,7 @@ TEST_F(Import, GltfOfWrongTypesAndRangesIsRefusedByPlace) {
         {R"("translation":[0,0,0])", {R"("matrix":[1,0,0,1,0,1,0,0,0,0,1,0,0,0,0,1])", "perspective"}},
         {R"("children":[1])", {R"("children":[2])", "nodes[0].children[0]"}},
         {R"("children":[1])", {R"("children":[0])", "two parents nodes[0]"}},
-        {R"("children":[1])", {R"("children":{})", "no list nodes[0].children"}},
+        {R"("children":[1])", {R"("children":{})", "not a list nodes[0].children"}},
         {R"("scene":0)", {R"("scene":1)", "does not exist scene"}},
         {R"("version":"2.0")", {R"("version":"1.0")", "asset.version"}},
         {R"("version":"2.0")", {R"("version":2)", "asset.version"}},
@@ -921,7 +921,7 @@ TEST_F(Import, HostileThreeDsIsRefused) {
            "does not exist");
     refuse(three_ds(object("a", frame({0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0})), node("a", 0, 0xffff, "")), "flat");
     refuse(three_ds(object("a"), node("a", 0, 1, "") + node("b", 1, 0, "")), "below itself");
-    refuse(three_ds(object("a"), node("a", 0, 9, "")), "no object");
+    refuse(three_ds(object("a"), node("a", 0, 9, "")), "not an object");
     refuse(three_ds(object("a"), node("a", 0, 0xffff, "") + node("a", 0, 0xffff, "")), "same number");
     refuse(three_ds(object("a"), node("a", 0, 0xffff, chunk(0xb020, raw(uint16_t{0}, uint64_t{0}, ~0u)))), "too early");
     refuse(three_ds(""), "no triangles");
