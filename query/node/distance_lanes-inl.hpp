@@ -17,12 +17,11 @@
 //   a, b    in float: |da| <= 14 u |n| |L1|, |db| <= 7 u |n| |L2| (lanes-inl.hpp), and what squares below 2^-126 lose,
 //           less than 2^-72; kLaneMargin (|L1| + |L2|), 32 u, is more than twice that
 //   boxes   of `one`: m = center + sum t_i axis_i, in which center and axes are wrong by at most 10 u of themselves
-//   (the
-//           float rotation, three products, two sums), and what the stored box loses when it is decoded in float is in
-//           half the sides (kBoxMargin); the support takes 3 products and 2 sums a term and 3 sums: 6 u. PlacedBox::
-//           slack is 32 u. Of the lane: with sides s = (origin - c2) + step q, wrong by u (2 |origin| + |c2| + |s|),
-//           and 3 products and 2 sums: less than 8 u (|origin| + 65535 + 255 step) an axis, which is kBoxMargin times
-//           it
+//           (the float rotation, three products, two sums), and what the stored box loses when it is decoded in float
+//           is in half the sides (kBoxMargin); the support takes 3 products and 2 sums a term and 3 sums: 6 u.
+//           PlacedBox::slack is 32 u. Of the lane: with sides s = (origin - c2) + step q, wrong by u (2 |origin| + |c2|
+//           + |s|), and 3 products and 2 sums: less than 8 u (|origin| + 65535 + 255 step) an axis, which is
+//           kBoxMargin times it
 //   p - a - b less these is therefore a lower bound of |n| g(n / |n|) if |n| <= 1 + 2^-20
 //   1/|n|   >= (3 - |n|^2) / 2, the tangent at |n| = 1; taken in double, clipped at 0 and less 2^-48 of itself, it pays
 //           for its own rounding and that of the product. For |n| > 1 + 2^-20 nothing is claimed: the factor is made 0.
