@@ -63,7 +63,7 @@ public:
 
     // One evaluation and the step to the next. True in lanes whose answer is good enough.
     HWY_INLINE Mask evaluate(Answer& out) {
-        const Evaluation e = evaluation();
+        const Evaluation e(p_, rho_, sigma_);
         const Float3 xa = e.qa * e.over_a, xb = e.qb * e.over_b, between = p_.r - xa - xb;
         const Float3 along{e.n.x * p_.r.x, e.n.y * p_.r.y, e.n.z * p_.r.z};
         const Float g = along.x + along.y + along.z - e.a - e.b, apart = length(between);
@@ -74,7 +74,7 @@ public:
         out.normal = e.n;
         out.point_a = p_.a.center + xa, out.point_b = p_.b.center - xb;
 
-        // Outside the bounds themselves must meet. Inside, |x2 - x1| and -g meet where n is stationary, and where M is
+        // Outside the bounds themselves must meet. Inside, |x2 - x1| and -g meet where n is stationary, and where Q is
         // positive definite that is a minimum of the depth.
         const Float wide = choose(inside_, apart + g, above - out.lower);
         const Mask definite = (e.det > 0) & (trace(e.adj) > 0);
@@ -84,27 +84,24 @@ public:
     }
 
 private:
-    // M = mu Q1 + lambda Q2 + nu I of trace 1, its adjugate and determinant; the direction n = m / |m|, m = adj(M) r;
-    // and of each body w = L^T n, Q n and |w|.
+    // Q = mu Q1 + lambda Q2 + nu I of trace 1, its adjugate and determinant; m = adj(Q) r, its length, the direction n
+    // = m / |m|; and of each body w = L^T n, L w, |w| and its inverse.
     struct Evaluation {
         Float mu, lambda, nu;
-        Sym3 adj;
-        Float det, length;
+        Sym3 q, adj;
+        Float det;
+        Float3 m;
+        Float norm;
         Float3 n, wa, wb, qa, qb;
         Float a, b, over_a, over_b;
+
+        HWY_INLINE Evaluation(const PairLanes& p, Float rho, Float sigma)
+            : mu(1 / (trace(p.q1) + rho * trace(p.q2) + 3 * sigma)), lambda(rho * mu), nu(sigma * mu),
+              q(plus_diagonal(p.combine(mu, lambda), nu)), adj(adjugate(q)), det(determinant(q, adj)), m(adj * p.r),
+              norm(length(m)), n(m * (1 / norm)), wa(transposed_times(p.a.factor, n)),
+              wb(transposed_times(p.b.factor, n)), qa(p.a.factor * wa), qb(p.b.factor * wb), a(length(wa)),
+              b(length(wb)), over_a(1 / a), over_b(1 / b) {}
     };
-    HWY_INLINE Evaluation evaluation() const {
-        Evaluation e{};
-        e.mu = 1 / (trace(p_.q1) + rho_ * trace(p_.q2) + 3 * sigma_), e.lambda = rho_ * e.mu, e.nu = sigma_ * e.mu;
-        const Sym3 q = plus_diagonal(p_.combine(e.mu, e.lambda), e.nu);
-        e.adj = adjugate(q), e.det = determinant(q, e.adj);
-        const Float3 m = e.adj * p_.r;
-        e.length = length(m), e.n = m * (1 / e.length);
-        e.wa = transposed_times(p_.a.factor, e.n), e.wb = transposed_times(p_.b.factor, e.n);
-        e.a = length(e.wa), e.b = length(e.wb), e.over_a = 1 / e.a, e.over_b = 1 / e.b;
-        e.qa = p_.a.factor * e.wa, e.qb = p_.b.factor * e.wb;
-        return e;
-    }
 
     // Steps in the logarithms of rho and sigma.
     struct Steps {
@@ -136,7 +133,7 @@ private:
 
         // Perram and Wertheim's rho alone, as long as there is neither a plane nor a common point.
         const Mask alone = sigma_ == 0, same_side = g * sigma_ > 0;
-        const Float scale = e.mu * e.length;
+        const Float scale = e.mu * e.norm;
         const Float ta = scale * (e.a + kLengthUnderflow) / e.det * (1 + 16 * kV),
                     tb = radial_in_b(p_, e.wa * scale, e.det);
         const Mask common = alone & (ta <= 1) & (tb <= 1);

@@ -7,7 +7,7 @@
 //
 // In kernels, structs of vectors begin with braces, `LaneNodes out{}`: GCC compiles the constructor that it makes up
 // for `LaneNodes out` without the kernel's instruction set, and then may not inline what Highway's NEON vectors do in
-// it.
+// it. Large structs have a HWY_INLINE constructor instead: GCC may really store the zeros that braces give them.
 #pragma once
 
 // Expanded by Highway's own headers, which define the names.
