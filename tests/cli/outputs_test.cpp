@@ -421,7 +421,7 @@ TEST_F(CliOutputs, TheProgressLineFitsAndDumbTerminalsGetNone) {
              Json{{"assets", {{{"mesh", name}, {"output", "a.etree"}, {"levels", 1}, {"quality", "fast"}}}}}.dump());
     RunOptions terminal;
     terminal.terminal = true;
-    for (const unsigned short width : std::initializer_list<unsigned short>{1, 2, 3, 12, 40}) {
+    for (const unsigned short width : std::initializer_list<unsigned short>{1, 12, 40}) {
         terminal.in_child = [width] {
             const winsize size{24, width, 0, 0};
             ::ioctl(2, TIOCSWINSZ, &size);
