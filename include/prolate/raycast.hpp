@@ -51,7 +51,7 @@ struct RaycastResult {
 /// as if a ball of this radius flew along it. A ray that begins within the margin, or inside a leaf ellipsoid, hits at
 /// t = 0; with an infinite or NaN margin, every ray does. Nodes at options.max_level count as the ellipsoids that hold
 /// all that lies below them. Nodes are visited nearest first, and not at all beyond the best hit. Thread-safe on shared
-/// trees. The search is described in query/raycast/raycast.cpp, the tests in query/raycast/ray.hpp.
+/// trees. The search is described in query/raycast/search.cpp, the tests in query/raycast/ray.hpp.
 RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
                       const QueryOptions& options = {}) noexcept;
 

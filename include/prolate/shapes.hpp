@@ -47,7 +47,7 @@ struct OverlapResult {
 };
 
 /// Do the body at `pose` and the shape meet, or come within options.margin of each other? Stops at the first leaf, or
-/// triangle, that does. Thread-safe on shared trees. The search is described in query/shapes/shapes.cpp, the tests in
+/// triangle, that does. Thread-safe on shared trees. The search is described in query/shapes/search.cpp, the tests in
 /// query/shapes/rounded_box.hpp.
 OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, QueryContext& context,
                       const QueryOptions& options = {}) noexcept;
