@@ -115,25 +115,26 @@ struct Lone {
     }
 };
 
-// Where the two triangles lie to each other's planes, and the products of edges at the lone corners.
+// How the two triangles lie to each other's planes, and the products of edges at the lone corners.
 struct LoneCorners {
     Float height_a[3], height_b[3]; // of the corners over the other's plane
     Lone lone_a, lone_b;
-    Mask below_a; // A's lone corner lies below B's plane
+    Mask below_a;       // A's lone corner lies below B's plane
+    Mask swap;          // the lone corners lie on different sides
+    Float3 out_b, in_b; // edges of B from and to its lone corner
     Float3 product[2];
     Projection on_product[2];
 
     HWY_INLINE LoneCorners(const TrianglePairLanes& pair, const Projection& on_b, const Projection& on_a)
         : height_a{0 - on_b.b[0], on_b.a1 - on_b.b[0], on_b.a2 - on_b.b[0]}, height_b{on_a.b[0], on_a.b[1], on_a.b[2]},
-          lone_a(height_a), lone_b(height_b), below_a(lone_a.of(height_a[0], height_a[1], height_a[2]) < 0) {
-        const auto& c = pair.edge_a;
-        const auto& g = pair.edge_b;
-        const Mask swap = below_a ^ (lone_b.of(height_b[0], height_b[1], height_b[2]) < 0);
-        const Float3 out_b = lone_b.of(g[0], g[1], g[2]), in_b = lone_b.of(g[2], g[0], g[1]);
-        product[0] = cross(lone_a.of(c[0], c[1], c[2]), choose(swap, in_b, out_b));
-        product[1] = cross(lone_a.of(c[2], c[0], c[1]), choose(swap, out_b, in_b));
-        for (size_t i = 0; i < 2; ++i) on_product[i] = pair.project(product[i]);
-    }
+          lone_a(height_a), lone_b(height_b), below_a(lone_a.of(height_a[0], height_a[1], height_a[2]) < 0),
+          swap(below_a ^ (lone_b.of(height_b[0], height_b[1], height_b[2]) < 0)),
+          out_b(lone_b.of(pair.edge_b[0], pair.edge_b[1], pair.edge_b[2])),
+          in_b(lone_b.of(pair.edge_b[2], pair.edge_b[0], pair.edge_b[1])),
+          product{cross(lone_a.of(pair.edge_a[0], pair.edge_a[1], pair.edge_a[2]), choose(swap, in_b, out_b)),
+                  cross(lone_a.of(pair.edge_a[2], pair.edge_a[0], pair.edge_a[1]), choose(swap, out_b, in_b))},
+          on_product{pair.project(product[0]), pair.project(product[1])} {}
+
     HWY_INLINE Mask separate(const LaneMargins& margins) const {
         return separates(product[0], on_product[0], margins) | separates(product[1], on_product[1], margins);
     }
