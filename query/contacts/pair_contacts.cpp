@@ -30,14 +30,14 @@ uint64_t mixed(uint64_t x) {
 
 Part part_of(const TreeView& tree, uint32_t triangle, Feature feature) {
     const Triangle v = tree.triangle(triangle);
-    if (feature < kFirstEdge) return {Part::Kind::vertex, v[feature]};
-    if (feature == kFace) return {Part::Kind::face};
+    if (feature < kFirstEdge) return {Part::Kind::vertex, v[feature], 0};
+    if (feature == kFace) return {Part::Kind::face, 0, 0};
     const size_t i = feature - kFirstEdge;
     const auto [first, second] = std::minmax(v[i], v[(i + 1) % 3]);
     return {Part::Kind::edge, first, second};
 }
 Part whole(uint32_t node, uint32_t triangle) {
-    return triangle != kNoTriangle ? Part{Part::Kind::triangle, triangle} : Part{Part::Kind::node, node};
+    return triangle != kNoTriangle ? Part{Part::Kind::triangle, triangle, 0} : Part{Part::Kind::node, node, 0};
 }
 // A contact of a pair as a whole: of nodes or triangles, not of features of these.
 Contact contact_of_whole(const MeetingPair& pair, const dvec3& normal, const dvec3& middle, double depth) {
@@ -263,7 +263,7 @@ void PairContacts::add_depth_of(uint32_t vertex, bool of_a, const MeetingPair& p
     if (!((of_a ? closed_b_ : closed_a_) ? facing > 0 : facing != 0)) return;
     const double depth = glm::dot(face, t.corner[0] - at) / facing;
     if (!(depth >= 0 && depth <= most + same_point_)) return;
-    const Part part{Part::Kind::vertex, vertex}, other{Part::Kind::face};
+    const Part part{Part::Kind::vertex, vertex, 0}, other{Part::Kind::face, 0, 0};
     out.add({.pair = pair,
              .normal = n,
              .middle = at - 0.5 * depth * up,

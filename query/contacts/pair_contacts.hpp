@@ -16,7 +16,7 @@ namespace prolate::query {
 /// What of one body touches, for an id.
 struct Part {
     enum class Kind : uint32_t { vertex = 1, edge, face, triangle, node } kind;
-    uint32_t first = 0, second = 0;
+    uint32_t first, second; ///< indices: of a vertex, of an edge's two, of a triangle or node; else 0
 };
 uint64_t id_of(const Part& a, const Part& b) noexcept;
 
