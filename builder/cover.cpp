@@ -70,7 +70,10 @@ Fit about_lattice_point(const Fit& fit, const format::Lattice& lattice,
                         const std::function<double(const Fit&)>& reach_of) {
     const double step = power_of_two(lattice.step_exponent);
     const Vec origin(lattice.origin[0], lattice.origin[1], lattice.origin[2]);
-    const Vec q = nearest_integers(step * fit.inverse, fit.center / step - origin);
+    Vec unit; // steps
+    for (int i = 0; i < 3; ++i) unit[i] = power_of_two(-format::fraction_bits(lattice.origin[i]));
+    const Vec q = unit.asDiagonal() * nearest_integers(step * fit.inverse * unit.asDiagonal(),
+                                                       (fit.center / step - origin).cwiseQuotient(unit));
     if ((q.array() < 0).any() || (q.array() > UINT16_MAX).any()) return fit;
     const Vec center = step * (origin + q), way = fit.center - center;
     const double off = std::sqrt(fit.radial_squared(center));

@@ -21,18 +21,6 @@
 namespace prolate::format {
 namespace {
 
-void store_node(std::byte* block, size_t lane, const PackedNode& node, uint32_t first) {
-    for (size_t i = 0; i < 3; ++i) {
-        store_le(block + block_offset(kBlockCenter, i, lane), node.center[i]);
-        store_le(block + block_offset(kBlockDiagonal, i, lane), node.diagonal[i]);
-        store_le(block + block_offset(kBlockOffDiagonal, i, lane), node.off_diagonal[i]);
-    }
-    store_le(block + kBlockExponent + lane, node.exponent);
-    const unsigned count = node.triangle_count ? kTriangleLeaf | node.triangle_count : node.child_count;
-    store_le(block + kBlockCount + lane, static_cast<uint8_t>(count));
-    store_le(block + kBlockFirst + 4 * lane, first);
-}
-
 void store_section(std::span<std::byte> section, size_t hull_bytes, const PackedTriangles& triangles) {
     std::byte* to = section.data() + hull_bytes + kSectionHashBytes;
     for (const Vec3& v : triangles.vertices)
@@ -50,6 +38,20 @@ void store_section(std::span<std::byte> section, size_t hull_bytes, const Packed
 }
 
 } // namespace
+
+void store_node(std::byte* block, size_t lane, const PackedNode& node) noexcept {
+    uint16_t fractions = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        store_le(block + block_offset(kBlockCenter, i, lane), node.center[i]);
+        store_le(block + block_offset(kBlockDiagonal, i, lane), node.diagonal[i]);
+        store_le(block + block_offset(kBlockOffDiagonal, i, lane), node.off_diagonal[i]);
+        fractions |= static_cast<uint16_t>(node.fraction[i] << kFractionBits * i);
+    }
+    store_le(block + kBlockFraction + 2 * lane, fractions);
+    store_le(block + kBlockExponent + lane, node.exponent);
+    const unsigned count = node.triangle_count ? kTriangleLeaf | node.triangle_count : node.child_count;
+    store_le(block + kBlockCount + lane, static_cast<uint8_t>(count));
+}
 
 std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Lattice& lattice,
                               std::span<const PackedLevel> levels, const PackedTriangles& triangles) {
@@ -130,10 +132,15 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
         auto node = level.nodes.begin();
         for (const uint32_t siblings : families) {
             for (uint32_t i = 0; i < siblings; ++i, ++node) {
-                const uint64_t first = node->child_count      ? kBlockLanes * next_block
-                                       : node->triangle_count ? next_triangle
-                                                              : 0;
-                store_node(block + i / kBlockLanes * kBlockBytes, i % kBlockLanes, *node, static_cast<uint32_t>(first));
+                std::byte* const to = block + i / kBlockLanes * kBlockBytes;
+                if (i % kBlockLanes == 0) {
+                    store_le(to + kBlockChildren, static_cast<uint32_t>(next_block));
+                    store_le(to + kBlockTriangles, next_triangle);
+                }
+                store_node(to, i % kBlockLanes, *node);
+                if (node->child_count)
+                    store_le(to + kBlockOffset + i % kBlockLanes,
+                             static_cast<uint8_t>(next_block - load_le<uint32_t>(to + kBlockChildren)));
                 next_triangle += node->triangle_count;
                 next_block += blocks_for(node->child_count);
                 if (node->child_count) next_families.push_back(node->child_count);
@@ -147,8 +154,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
                 std::vector<PackedNode> nodes;
                 for (uint32_t lane = 0; lane < count; ++lane) {
                     nodes.push_back(bounding->node(l, static_cast<size_t>(first - level.nodes.begin()) + lane));
-                    store_node(bounding_block, lane, nodes.back(),
-                               load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane));
+                    store_node(bounding_block, lane, nodes.back());
                 }
                 store_boxes(bounding_block, nodes, lattice);
                 bounding_block += kBlockBytes;

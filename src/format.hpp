@@ -1,7 +1,7 @@
 // Writing .etree files (src/FORMAT.md is normative). TreeView reads them: open.cpp checks, tree.cpp decodes.
 //
 // A node's numbers are integers times powers of two, so that decoding is exact and the same everywhere:
-//     center = (origin + q) * 2^step_exponent           q: three uint16, |origin + q| < 2^24: exact in a float
+//     center = (origin + q + r / 32) * 2^step_exponent   q: three uint16, r: three times 5 bits; a float holds it
 //     l_ii   = d_i^2 * 2^(exponent - 30)                d: three uint16, 1 ... 65535
 //     l_ij   = o_j |o_j| * 2^(exponent - 30)            o: three int16      both rounded to a float
 // Squares, because the entries of a thin ellipsoid's factor are both large and small: where the largest is 1, steps at
@@ -26,7 +26,8 @@ namespace prolate::format {
 using Lattice = LatticeInfo;
 
 inline constexpr int32_t kMaxCoordinate = 1 << 24; ///< |origin + q| stays below: integers that a float holds exactly
-inline constexpr int32_t kMinStepExponent = -120, kMaxStepExponent = 60;
+inline constexpr int kCenterBits = 24;             ///< significant ones of origin + q + r / 32: those of a float
+inline constexpr int32_t kMinStepExponent = -112, kMaxStepExponent = 60;
 inline constexpr int32_t kMinNodeExponent = -90, kMaxNodeExponent = 100; ///< no entry is subnormal
 
 /// What an integer of a node's factor stands for, before it is rounded to a float.
@@ -43,6 +44,7 @@ inline int32_t nearest_entry(double value, int32_t exponent) noexcept {
 /// A node as stored, but for the place of its children or triangles, which encode() finds.
 struct PackedNode {
     uint16_t center[3] = {};
+    uint8_t fraction[3] = {};         // of a step, 32nds, by which the center lies beyond
     uint16_t diagonal[3] = {1, 1, 1}; // l11, l22, l33
     int16_t off_diagonal[3] = {};     // l21, l31, l32
     int8_t exponent = 0;
@@ -52,10 +54,14 @@ struct PackedNode {
     uint8_t triangle_count = 0; // of a leaf of an exact tree
 };
 
-/// Lattice for centers inside the box [low, high], all finite: the finest step for which 16 bits reach across, a float
-/// holds every center exactly, and `size`, the largest half extent of a node, takes at most 2^20 steps. So nodes whose
-/// centers all but coincide, and their boxes, keep within what single precision holds.
+/// Lattice for centers inside the box [low, high], all finite: the finest step for which 2^16 steps reach across, a
+/// float holds every center exactly, and `size`, the largest half extent of a node, takes at most 2^20 steps. So nodes
+/// whose centers all but coincide, and their boxes, keep within what single precision holds.
 Lattice lattice_for(const double low[3], const double high[3], double size = 0) noexcept;
+
+/// Bits behind the point that quantise() gives centers along an axis, 0 ... kFractionBits: all that a float holds
+/// wherever they lie on the lattice.
+int fraction_bits(int32_t origin) noexcept;
 
 /// Nearest representable node to {center + L u}; child fields are left alone. `factor` = l11, l21, l22, l31, l32, l33.
 /// Components beyond the lattice are clamped to its border.
@@ -63,6 +69,9 @@ void quantise(PackedNode& node, const Lattice& lattice, const double center[3], 
 
 /// Exactly what TreeView::ellipsoid returns for the node.
 Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept;
+
+/// Stores all of a node in a lane of its block but where its children begin and its box.
+void store_node(std::byte* block, size_t lane, const PackedNode& node) noexcept;
 
 /// Stores the boxes of up to kBlockLanes siblings in their block, outward rounded.
 void store_boxes(std::byte* block, std::span<const PackedNode> siblings, const Lattice& lattice) noexcept;

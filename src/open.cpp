@@ -14,7 +14,9 @@
 #include <prolate/version.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 
 namespace prolate {
@@ -143,16 +145,20 @@ Result<Levels> check_levels(std::span<const std::byte> bytes, uint32_t level_cou
 // has one parent, before it, and each triangle one leaf.
 class NodeCheck {
 public:
-    NodeCheck(const std::byte* file, size_t first_block, uint32_t degree, bool exact, int32_t step_exponent)
-        : file_(file), first_block_(first_block), degree_(degree), exact_(exact), step_exponent_(step_exponent) {}
+    NodeCheck(const std::byte* file, size_t first_block, uint32_t degree, bool exact, const LatticeInfo& lattice)
+        : file_(file), first_block_(first_block), degree_(degree), exact_(exact), lattice_(lattice) {}
 
     // The next level's blocks begin at block `end` of the tree.
     void begin_level(uint32_t end) { children_ = 0, level_end_ = next_child_block_ = end; }
 
     // The next `count` siblings, in blocks that the caller has found to be there.
     Result<void> family(uint32_t count) {
-        for (uint32_t i = 0; i < count; ++i)
-            if (const auto sound = node(at(block_ + i / kBlockLanes), i % kBlockLanes); !sound) return sound;
+        for (uint32_t i = 0; i < count; ++i) {
+            const size_t block = at(block_ + i / kBlockLanes);
+            if (i % kBlockLanes == 0)
+                if (const auto sound = begin_block(block); !sound) return sound;
+            if (const auto sound = node(block, i % kBlockLanes); !sound) return sound;
+        }
         for (uint32_t i = 0; i < blocks_for(count); ++i)
             if (const auto sound = box_frame(at(block_ + i)); !sound) return sound;
         block_ += blocks_for(count);
@@ -169,12 +175,14 @@ public:
     // ellipsoids and boxes are sound, too.
     Result<void> bounding_block(uint32_t b, size_t where) const {
         const std::byte *const from = file_ + where, *const nodes = file_ + at(b);
+        for (const size_t array : {kBlockChildren, kBlockTriangles})
+            if (load_le<uint32_t>(from + array) != load_le<uint32_t>(nodes + array))
+                return bad("a bounding block has other children than its block", where + array);
         uint32_t lane = 0;
         for (; lane < kBlockLanes && load_le<uint16_t>(nodes + block_offset(kBlockDiagonal, 0, lane)) != 0; ++lane) {
-            const size_t first = kBlockFirst + size_t{4} * lane;
-            if (from[kBlockCount + lane] != nodes[kBlockCount + lane] ||
-                load_le<uint32_t>(from + first) != load_le<uint32_t>(nodes + first))
-                return bad("a bounding block has other nodes than its block", where + first);
+            for (const size_t array : {kBlockCount, kBlockOffset})
+                if (from[array + lane] != nodes[array + lane])
+                    return bad("a bounding block has other nodes than its block", where + array + lane);
             if (nodes[kBlockCount + lane] == std::byte{0} && !same_ellipsoid(from, nodes, lane))
                 return bad("a bounding block has another leaf than its block",
                            where + block_offset(kBlockCenter, 0, lane));
@@ -191,34 +199,52 @@ public:
 private:
     size_t at(uint32_t block) const { return first_block_ + size_t{block} * kBlockBytes; }
 
+    // Where the children and triangles of a block's nodes begin: behind those of the nodes before.
+    Result<void> begin_block(size_t block) const {
+        if (load_le<uint32_t>(file_ + block + kBlockChildren) != next_child_block_)
+            return bad("children are not in breadth-first order", block + kBlockChildren);
+        if (load_le<uint32_t>(file_ + block + kBlockTriangles) != next_triangle_)
+            return bad("triangles are not in breadth-first order", block + kBlockTriangles);
+        return {};
+    }
+
     Result<void> node(size_t block, size_t lane) {
         const std::byte* const from = file_ + block;
-        const size_t at_count = kBlockCount + lane, at_first = kBlockFirst + 4 * lane;
+        const size_t at_count = kBlockCount + lane;
         const uint32_t count = load_le<uint8_t>(from + at_count);
         const bool has_triangles = (count & kTriangleLeaf) != 0;
         const uint32_t children = has_triangles ? 0 : count, triangles = has_triangles ? count - kTriangleLeaf : 0;
         if (children > degree_) return bad("a node has more children than the degree", block + at_count);
         if (has_triangles != (exact_ && children == 0) || has_triangles != (triangles > 0))
             return bad("a leaf has no triangles, or some in a tree without", block + at_count);
-        const uint64_t first = children ? kBlockLanes * next_child_block_ : triangles ? next_triangle_ : 0;
-        if (load_le<uint32_t>(from + at_first) != first)
-            return bad("children or triangles are not in breadth-first order", block + at_first);
+        const uint64_t offset = children > 0 ? next_child_block_ - load_le<uint32_t>(from + kBlockChildren) : 0;
+        if (load_le<uint8_t>(from + kBlockOffset + lane) != offset)
+            return bad("children are not in breadth-first order", block + kBlockOffset + lane);
         children_ += children;
         next_child_block_ += blocks_for(children);
         next_triangle_ += triangles;
         return shape(block, lane);
     }
 
-    // Size, ellipsoid and box of a node.
+    // Center, size, ellipsoid and box of a node.
     Result<void> shape(size_t block, size_t lane) const {
         const std::byte* const from = file_ + block;
+        if (load_le<uint16_t>(from + kBlockFraction + 2 * lane) & kNoFraction)
+            return bad("reserved bits are not zero", block + kBlockFraction + 2 * lane);
+        for (size_t i = 0; i < 3; ++i) {
+            const int32_t stored = stored_center(from, i, lane);
+            if (stored > kMaxCenter) return bad("a center lies beyond the lattice", block + kBlockFraction + 2 * lane);
+            const auto x = static_cast<uint64_t>(std::abs(int64_t{lattice_.origin[i]} * kCenterUnits + stored));
+            if (x != 0 && std::bit_width(x) - std::countr_zero(x) > format::kCenterBits)
+                return bad("a center has more bits than a float", block + kBlockFraction + 2 * lane);
+        }
         const size_t at_size = kBlockExponent + lane;
         const auto exponent = load_le<int8_t>(from + at_size);
         if (exponent < format::kMinNodeExponent || exponent > format::kMaxNodeExponent)
             return bad("node size out of range", block + at_size);
-        if (exponent - step_exponent_ > kMaxNodeSize)
+        if (exponent - lattice_.step_exponent > kMaxNodeSize)
             return bad("a node is too large for the lattice's step", block + at_size);
-        if (exponent - step_exponent_ < kMinNodeSize)
+        if (exponent - lattice_.step_exponent < kMinNodeSize)
             return bad("a node is too small for the lattice's step", block + at_size);
         for (size_t i = 0; i < 3; ++i)
             if (const size_t here = block_offset(kBlockDiagonal, i, lane); load_le<uint16_t>(from + here) == 0)
@@ -245,11 +271,12 @@ private:
 
     static bool same_ellipsoid(const std::byte* a, const std::byte* b, size_t lane) {
         bool same = a[kBlockExponent + lane] == b[kBlockExponent + lane];
-        for (const size_t array : {kBlockCenter, kBlockDiagonal, kBlockOffDiagonal})
+        for (const size_t array : {kBlockDiagonal, kBlockOffDiagonal})
             for (size_t i = 0; i < 3; ++i) {
                 const size_t at = block_offset(array, i, lane);
                 same = same && load_le<uint16_t>(a + at) == load_le<uint16_t>(b + at);
             }
+        for (size_t i = 0; i < 3; ++i) same = same && stored_center(a, i, lane) == stored_center(b, i, lane);
         return same;
     }
 
@@ -258,8 +285,8 @@ private:
         struct Row { // eight numbers of one kind
             size_t begin, width;
         };
-        Row rows[18] = {{kBlockExponent, 1}, {kBlockCount, 1}, {kBlockFirst, 4}};
-        size_t count = 3;
+        Row rows[19] = {{kBlockExponent, 1}, {kBlockCount, 1}, {kBlockOffset, 1}, {kBlockFraction, 2}};
+        size_t count = 4;
         for (const size_t array : {kBlockBoxLow, kBlockBoxHigh})
             for (size_t i = 0; i < 3; ++i) rows[count++] = {array + kBlockLanes * i, 1};
         for (const size_t array : {kBlockCenter, kBlockDiagonal, kBlockOffDiagonal})
@@ -276,7 +303,7 @@ private:
     const size_t first_block_;
     const uint32_t degree_;
     const bool exact_;
-    const int32_t step_exponent_;
+    const LatticeInfo lattice_;
     uint32_t block_ = 0; // of the next family
     uint64_t level_end_ = 0, next_child_block_ = 0;
     uint64_t children_ = 0, next_triangle_ = 0;
@@ -322,7 +349,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.is_prefix_ = bytes.size() < total;
     for (size_t i = 0; i < 3; ++i) view.raw_.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
     view.raw_.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
-    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, view.raw_.lattice_.step_exponent);
+    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, view.raw_.lattice_);
     for (uint32_t l = 0; l < present; ++l) {
         const LevelInfo level = view.level(l);
         view.node_count_ += level.node_count;
@@ -358,6 +385,7 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
             if (const auto sound = check.bounding_block(b, bounding + size_t{b} * kBlockBytes); !sound)
                 return sound.error();
     }
+    view.root_bound_ = view.bound(0);
     const uint64_t next_triangle = check.triangles();
     if (next_triangle > triangle_count || (present == level_count && next_triangle != triangle_count))
         return bad("the leaves do not share out the triangles", kAtTriangleCount);

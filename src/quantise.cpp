@@ -6,6 +6,7 @@
 #include "src/power_of_two.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 
@@ -30,10 +31,19 @@ Lattice lattice_for(const double low[3], const double high[3], double size) noex
     return lattice;
 }
 
+int fraction_bits(int32_t origin) noexcept {
+    const auto farthest = static_cast<uint32_t>(std::max(std::abs(origin), std::abs(origin + UINT16_MAX)));
+    return std::min(kCenterBits - static_cast<int>(std::bit_width(farthest - 1)), kFractionBits);
+}
+
 void quantise(PackedNode& node, const Lattice& lattice, const double center[3], const double factor[6]) noexcept {
     for (size_t i = 0; i < 3; ++i) {
-        const double q = std::nearbyint(std::ldexp(center[i], -lattice.step_exponent)) - lattice.origin[i];
-        node.center[i] = static_cast<uint16_t>(std::clamp(q, 0.0, double{UINT16_MAX}));
+        const int bits = fraction_bits(lattice.origin[i]);
+        const double nearest = std::nearbyint(std::ldexp(center[i], bits - lattice.step_exponent));
+        const double q = std::ldexp(nearest, -bits) - lattice.origin[i];
+        const auto stored = static_cast<int32_t>(std::clamp(q, 0.0, double{UINT16_MAX}) * kCenterUnits);
+        node.center[i] = static_cast<uint16_t>(stored / kCenterUnits);
+        node.fraction[i] = static_cast<uint8_t>(stored % kCenterUnits);
     }
     const double diagonal[3] = {factor[0], factor[2], factor[5]};
     const double off[3] = {factor[1], factor[3], factor[4]};
@@ -89,9 +99,10 @@ void store_boxes(std::byte* block, std::span<const PackedNode> siblings, const L
 }
 
 Ellipsoid decode(const PackedNode& node, const Lattice& lattice) noexcept {
-    const auto step = static_cast<float>(power_of_two(lattice.step_exponent));
+    const auto unit = static_cast<float>(power_of_two(lattice.step_exponent) / kCenterUnits);
     const auto coordinate = [&](size_t i) {
-        return static_cast<float>(lattice.origin[i] + int32_t{node.center[i]}) * step;
+        const int64_t steps = lattice.origin[i] + int32_t{node.center[i]};
+        return static_cast<float>(steps * kCenterUnits + node.fraction[i]) * unit;
     };
     const auto diagonal = [&](size_t i) { return static_cast<float>(entry(node.diagonal[i], node.exponent)); };
     const auto off = [&](size_t i) { return static_cast<float>(entry(node.off_diagonal[i], node.exponent)); };

@@ -100,8 +100,10 @@ namespace {
 
 Ellipsoid ellipsoid_at(const std::byte* from, size_t lane, const LatticeInfo& lattice) {
     format::PackedNode packed;
+    const uint32_t fractions = load_le<uint16_t>(from + kBlockFraction + 2 * lane);
     for (size_t i = 0; i < 3; ++i) {
         packed.center[i] = load_le<uint16_t>(from + block_offset(kBlockCenter, i, lane));
+        packed.fraction[i] = static_cast<uint8_t>(fractions >> kFractionBits * i & (kCenterUnits - 1));
         packed.diagonal[i] = load_le<uint16_t>(from + block_offset(kBlockDiagonal, i, lane));
         packed.off_diagonal[i] = load_le<int16_t>(from + block_offset(kBlockOffDiagonal, i, lane));
     }
@@ -125,9 +127,8 @@ Ellipsoid TreeView::bound(uint32_t node) const noexcept {
 ChildRange TreeView::children(uint32_t node) const noexcept {
     assert(is_node(node));
     const auto [from, lane] = place_of(*this, node);
-    const ChildRange range{load_le<uint32_t>(from + kBlockFirst + 4 * lane),
-                           load_le<uint8_t>(from + kBlockCount + lane)};
-    return range.first < slot_count() && range.count < kTriangleLeaf ? range : ChildRange{};
+    const uint32_t count = load_le<uint8_t>(from + kBlockCount + lane), first = first_child(from, lane);
+    return count > 0 && count < kTriangleLeaf && first < slot_count() ? ChildRange{first, count} : ChildRange{};
 }
 
 TriangleRange TreeView::triangles(uint32_t node) const noexcept {
@@ -135,7 +136,7 @@ TriangleRange TreeView::triangles(uint32_t node) const noexcept {
     const auto [from, lane] = place_of(*this, node);
     const auto count = load_le<uint8_t>(from + kBlockCount + lane);
     if (!has_triangles() || count < kTriangleLeaf) return {};
-    return {load_le<uint32_t>(from + kBlockFirst + 4 * lane), uint32_t{count} - kTriangleLeaf};
+    return {first_triangle(from, lane), uint32_t{count} - kTriangleLeaf};
 }
 
 Triangle TreeView::triangle(uint32_t t) const noexcept {

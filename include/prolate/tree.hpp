@@ -107,6 +107,8 @@ public:
     /// An ellipsoid that holds all leaf ellipsoids below `node`, or if has_triangles() all triangles. Of a leaf, its
     /// own.
     Ellipsoid bound(uint32_t node) const noexcept;
+    /// bound(0), with which queries begin.
+    const Ellipsoid& root_bound() const noexcept { return root_bound_; }
     /// The children of `node`; none for a leaf, and none for the last level of a prefix.
     ChildRange children(uint32_t node) const noexcept;
     bool is_leaf(uint32_t node) const noexcept { return children(node).count == 0; }
@@ -159,7 +161,7 @@ private:
     }
     std::span<const std::byte> bytes_;
     detail::TreeBytes raw_;
-    Ellipsoid root_;
+    Ellipsoid root_, root_bound_;
     uint32_t node_count_ = 0;
     uint32_t block_count_ = 0;
     uint32_t level_count_ = 0;

@@ -85,12 +85,15 @@ private:
     struct Kept {
         alignas(64) float depth[kBlockLanes]; // p / (a + b)
         alignas(64) float n[3][kBlockLanes];
+        // For hulls only:
         alignas(64) float gap[kBlockLanes]; // beyond the margins
         alignas(64) float a[kBlockLanes], b[kBlockLanes];
         alignas(64) float in_a[3][kBlockLanes], in_b[3][kBlockLanes]; // L1^T n, L2^T n
-        HWY_INLINE void keep(const LaneTerms& t, Float margin, size_t i) {
+        HWY_INLINE void keep(const LaneTerms& t, size_t i) {
             store(t.p / t.sum, depth + i);
             store(t.n, n, i);
+        }
+        HWY_INLINE void keep_for_hulls(const LaneTerms& t, Float margin, size_t i) {
             store(t.a, a + i), store(t.b, b + i);
             store(t.in_a, in_a, i), store(t.in_b, in_b, i);
             Float beyond = t.gap;
@@ -140,7 +143,8 @@ private:
             const LaneTerms t = evaluate(load_nodes(block, i, side.lattice.step_exponent), single);
             met |= bits(!separated<kMargin>(t, margin)) << i;
             larger |= bits(t.size > single.size) << i;
-            kept.keep(t, margin, i);
+            kept.keep(t, i);
+            if (have_hulls_) kept.keep_for_hulls(t, margin, i);
         }
         meet &= met;
         if (meet == 0) return false;

@@ -169,11 +169,11 @@ private:
 
     // What opening a node, or looking at a leaf's triangles, will need: they are seldom in the cache.
     static HWY_INLINE void prefetch(const DistanceSide& side, const std::byte* block, uint32_t lane, bool leaf) {
-        const uint32_t first = children_in(block, lane).first;
         if (leaf) {
-            if (side.triangles != nullptr) hwy::Prefetch(side.triangles + size_t{first} * side.triangle_bytes);
+            if (side.triangles != nullptr)
+                hwy::Prefetch(side.triangles + size_t{first_triangle(block, lane)} * side.triangle_bytes);
         } else {
-            const std::byte* const children = side.block(first);
+            const std::byte* const children = side.block(first_child(block, lane));
             for (size_t i = 0; i < kBlockBytes; i += kBlockAlignment) hwy::Prefetch(children + i);
         }
     }

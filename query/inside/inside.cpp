@@ -103,12 +103,11 @@ private:
             family.mask &= family.mask - 1;
             const std::byte* const block = tree_.raw().block(family.block);
             const uint32_t count = load_le<uint8_t>(block + kBlockCount + lane);
-            const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
             if (count >= kTriangleLeaf) {
-                if (!add_crossings({first, count - kTriangleLeaf}, start.direction)) return false;
+                if (!add_crossings({first_triangle(block, lane), count - kTriangleLeaf}, start.direction)) return false;
                 continue;
             }
-            stack[++depth] = {first / kBlockLanes, count, 0};
+            stack[++depth] = {first_child(block, lane) / kBlockLanes, count, 0};
             if (!look(stack[depth])) return false;
         }
     }

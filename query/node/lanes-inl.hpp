@@ -9,8 +9,8 @@
 // that a perfect direction would separate; the traversal goes on for those.
 //
 // Why single precision suffices. Everything is in the lattice coordinates of the block's tree, where its centers c2 are
-// integers below 2^16, and L2 is what the format says it is, a float each: both exact. u = 2^-24, norms Euclidean or
-// Frobenius.
+// multiples of 2^-5 up to 65535, and L2 is what the format says it is, a float each: both exact. u = 2^-24, norms
+// Euclidean or Frobenius.
 //   c1      computed in double (within 2^-44 reach, LatticePose), rounded once:      |dc1| <= u |c1| + 2^-44 reach
 //   r       one subtraction:                                                         |dr|  <= |dc1| + u |r|
 //   L1      rounded rotation (u) times exact factor, 3 products and 2 sums:          |dL1| <= 4 sqrt(3) u |L1|
@@ -68,7 +68,11 @@ HWY_INLINE LaneNodes load_nodes(const std::byte* block, size_t first, int32_t st
         const Float q = load_integers<int16_t>(at(kBlockOffDiagonal, row));
         return q * unit * abs(q);
     };
-    const auto center = [&](size_t row) { return load_integers<uint16_t>(at(kBlockCenter, row)); };
+    const auto fractions = load_widened<uint16_t>(block + kBlockFraction + 2 * first);
+    const auto center = [&](size_t row) { // exact, so that a fused operation gives the same bits
+        const Float fraction = hn::ConvertTo(FloatTag(), hn::And(fractions, hn::Set(d32, fraction_mask(row))));
+        return hn::MulAdd(fraction, set(fraction_unit(row)), load_integers<uint16_t>(at(kBlockCenter, row)));
+    };
     LaneNodes out{};
     out.center = {center(0), center(1), center(2)};
     out.factor = {.l11 = diagonal(0),

@@ -75,7 +75,8 @@ inline LaneNode load_node(const std::byte* block, uint32_t lane, int32_t step_ex
         const auto q = static_cast<float>(load_le<int16_t>(at(kBlockOffDiagonal, i)));
         return q * unit * std::abs(q);
     };
-    return {{natural(kBlockCenter, 0), natural(kBlockCenter, 1), natural(kBlockCenter, 2)},
+    const auto center = [&](size_t i) { return static_cast<float>(stored_center(block, i, lane)) / kCenterUnits; };
+    return {{center(0), center(1), center(2)},
             diagonal(0),
             off_diagonal(0),
             diagonal(1),
@@ -99,7 +100,6 @@ bool boxes_apart(const std::byte* block, uint32_t lane, const Single& single, fl
 
 /// The record of the inner node in `lane` of `block`, of those that begin at `hulls`; null if that is.
 inline const std::byte* hull_of(const std::byte* hulls, const std::byte* block, uint32_t lane) {
-    const auto first = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
-    return hulls != nullptr ? hulls + size_t{first / kBlockLanes} * kHullBytes : nullptr;
+    return hulls != nullptr ? hulls + size_t{first_child(block, lane) / kBlockLanes} * kHullBytes : nullptr;
 }
 } // namespace prolate::query

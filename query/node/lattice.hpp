@@ -1,5 +1,5 @@
 // The frames that queries work in: lattice coordinates of a tree, x = metres / step - origin, in which the centers of
-// its nodes are the stored integers 0 ... 65535. Steps are powers of two, so lengths change frames without rounding.
+// its nodes are as stored, 32nds from 0 to 65535. Steps are powers of two, so lengths change frames without rounding.
 #pragma once
 
 #include "query/ellipsoid/placed.hpp"

@@ -29,7 +29,7 @@ HWY_INLINE Quad sum_of_three(Quad v) {
 
 // A node as stored, lattice steps of its own tree.
 struct QuadNode {
-    int32_t x, y, z;                   // the center
+    Quad center;
     Quad l11, l21, l22, l31, l32, l33; // each in all four components
 };
 HWY_INLINE QuadNode load_quad_node(const std::byte* block, uint32_t lane, int32_t step_exponent) {
@@ -48,12 +48,14 @@ HWY_INLINE QuadNode load_quad_node(const std::byte* block, uint32_t lane, int32_
         const Quad q = hn::ConvertTo(QuadTag(), hn::ShiftRight<16>(hn::BitCast(d32, twice)));
         return q * unit * abs(q);
     };
-    const auto coordinate = [&](size_t row) {
-        return int32_t{load_le<uint16_t>(block + block_offset(kBlockCenter, row, lane))};
-    };
-    return {.x = coordinate(0),
-            .y = coordinate(1),
-            .z = coordinate(2),
+    const auto steps = [&](size_t row) { return load_le<uint16_t>(block + block_offset(kBlockCenter, row, lane)); };
+    const auto whole = hn::InsertLane(
+        hn::InsertLane(hn::InsertLane(hn::Zero(hn::FixedTag<uint16_t, 8>()), 0, steps(0)), 2, steps(1)), 4, steps(2));
+    alignas(16) static constexpr int32_t kMasks[] = {fraction_mask(0), fraction_mask(1), fraction_mask(2), 0};
+    alignas(16) static constexpr float kUnits[] = {fraction_unit(0), fraction_unit(1), fraction_unit(2), 0};
+    const QuadInteger fractions = hn::Set(d32, load_le<uint16_t>(block + kBlockFraction + 2 * lane));
+    const Quad fraction = hn::ConvertTo(QuadTag(), hn::And(fractions, hn::Load(d32, kMasks)));
+    return {.center = hn::MulAdd(fraction, load<Quad>(kUnits), hn::ConvertTo(QuadTag(), hn::BitCast(d32, whole))),
             .l11 = diagonal(0),
             .l21 = off_diagonal(0),
             .l22 = diagonal(1),
@@ -66,8 +68,14 @@ HWY_INLINE QuadNode load_quad_node(const std::byte* block, uint32_t lane, int32_
 HWY_INLINE void place_center(const QuadNode& e, const LatticePose& pose, Single& s) {
     const hn::CappedTag<double, 4> d64;
     const hn::Rebind<float, decltype(d64)> rounded;
-    const auto wide = [d64](int32_t stored) { return hn::Set(d64, static_cast<double>(stored)); };
-    const auto x = wide(e.x), y = wide(e.y), z = wide(e.z);
+    const auto wide = [d64](auto component) {
+        if constexpr (hn::MaxLanes(d64) == 4)
+            return hn::PromoteTo(d64, component);
+        else
+            return hn::PromoteTo(d64, hn::LowerHalf(component));
+    };
+    const Quad3 stored = spread(e.center);
+    const auto x = wide(stored.x), y = wide(stored.y), z = wide(stored.z);
     for (size_t i = 0; i < 4; i += hn::Lanes(d64)) {
         const auto column = [&](size_t c) { return hn::Load(d64, pose.linear[c] + i); };
         const auto exact = (column(0) * x + column(1) * y) + (column(2) * z + hn::Load(d64, pose.offset + i));
@@ -113,10 +121,8 @@ HWY_INLINE Single place_here(const std::byte* block, uint32_t lane, const Lattic
 
     // Cut with the box around the node's own box, as it lies in these coordinates.
     const QuadBox own = box_of(block, lane);
-    const Quad stored =
-        hn::ConvertTo(QuadTag(), hn::InsertLane(hn::InsertLane(hn::Set(QuadIntegerTag(), e.x), 1, e.y), 2, e.z));
     const Quad3 half = spread(own.half);
-    const Quad turned = dot(turn, spread(own.center - stored)); // the box's center
+    const Quad turned = dot(turn, spread(own.center - e.center)); // the box's center
     const Quad around = dot(Quad3{abs(turn.x), abs(turn.y), abs(turn.z)}, half);
     const Quad at = center + turned, half_box = slack + around;
     store(greater(low, at - half_box), s.low), store(lesser(high, at + half_box), s.high);

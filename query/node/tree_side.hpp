@@ -44,7 +44,7 @@ TreeSide tree_side(const TreeView& tree, uint32_t max_level) noexcept;
 
 /// The children of the inner node in `lane` of `block`.
 inline ChildRange children_in(const std::byte* block, uint32_t lane) noexcept {
-    return {load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane), load_le<uint8_t>(block + kBlockCount + lane)};
+    return {first_child(block, lane), load_le<uint8_t>(block + kBlockCount + lane)};
 }
 
 /// Calls test(first, count) for the siblings of each block, in order, until one call returns false. Did none?

@@ -146,8 +146,8 @@ HWY_INLINE void store_unaligned(Float x, float* to) {
     hn::StoreU(x, FloatTag(), to);
 }
 
-/// Little-endian integers of one or two bytes at any address, as floats.
-template <class T> HWY_INLINE Float load_integers(const std::byte* from) {
+/// Little-endian integers of one or two bytes at any address, of four bytes each.
+template <class T> HWY_INLINE auto load_widened(const std::byte* from) {
     const hn::Rebind<T, FloatTag> tag;
 #if HWY_TARGET == HWY_SCALAR
     const auto stored = hn::Set(tag, load_le<T>(from));
@@ -155,7 +155,11 @@ template <class T> HWY_INLINE Float load_integers(const std::byte* from) {
     const hn::Repartition<uint8_t, decltype(tag)> bytes;
     const auto stored = hn::BitCast(tag, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(from)));
 #endif
-    return hn::ConvertTo(FloatTag(), hn::PromoteTo(hn::Rebind<int32_t, FloatTag>(), stored));
+    return hn::PromoteTo(hn::Rebind<int32_t, FloatTag>(), stored);
+}
+/// And as floats.
+template <class T> HWY_INLINE Float load_integers(const std::byte* from) {
+    return hn::ConvertTo(FloatTag(), load_widened<T>(from));
 }
 
 // ---- Masks ----

@@ -72,12 +72,11 @@ template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) 
         for (uint32_t lane = 0; lane < count; ++lane) {
             if ((held >> lane & 1) == 0) continue;
             const uint32_t children = load_le<uint8_t>(block + kBlockCount + lane);
-            const auto begin = load_le<uint32_t>(block + kBlockFirst + size_t{4} * lane);
             if (children < kTriangleLeaf) {
-                stack[size++] = {begin, children};
+                stack[size++] = {first_child(block, lane), children};
                 continue;
             }
-            const uint32_t triangles = children - kTriangleLeaf;
+            const uint32_t begin = first_triangle(block, lane), triangles = children - kTriangleLeaf;
             tests_ += triangles;
             for (uint32_t t = begin; t < begin + triangles; ++t) {
                 const Triangle corners = tree_.triangle(t);

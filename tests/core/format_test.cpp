@@ -2,6 +2,8 @@
 //
 // The expected numbers are the format's (src/FORMAT.md). If one of these tests fails because the layout changed, the
 // format version must change too, and the old golden file stays.
+#include "src/block.hpp"
+#include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "tests/scenes.hpp"
 
@@ -11,15 +13,18 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <sys/resource.h>
@@ -47,12 +52,14 @@ constexpr Lattice kGoldenLattice{{-30, 7, 1000}, -4};
 std::vector<PackedLevel> golden_levels() {
     std::vector<PackedLevel> levels(3);
     levels[0] = {{{.center = {10, 20, 30},
+                   .fraction = {16, 1, 31},
                    .diagonal = {40000, 50000, 60000},
                    .off_diagonal = {-1000, 2000, -3000},
                    .exponent = 1,
                    .child_count = 2}},
                  {2.5, 0.125, 2.5, 43.75, 0.75, 0.625, 0.25, 0.5}};
     levels[1] = {{{.center = {0, 0, 0},
+                   .fraction = {0, 8, 3},
                    .diagonal = {1, 2, 65535},
                    .off_diagonal = {32767, -32768, 0},
                    .exponent = 0,
@@ -211,8 +218,8 @@ void expect_sound(const TreeView& tree) {
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenExactFileOfVersionFive) {
-    const Bytes file = golden_file("golden_v5_exact.etree", golden_exact());
+TEST(Format, GoldenExactFileOfVersionSix) {
+    const Bytes file = golden_file("golden_v6_exact.etree", golden_exact());
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
@@ -253,8 +260,8 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
     }
 }
 
-TEST(Format, GoldenFileOfVersionFive) {
-    const Bytes file = golden_file("golden_v5.etree", golden());
+TEST(Format, GoldenFileOfVersionSix) {
+    const Bytes file = golden_file("golden_v6.etree", golden());
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -270,15 +277,15 @@ TEST(Format, GoldenFileOfVersionFive) {
     EXPECT_EQ(tree->level_count(), 3u);
     EXPECT_EQ(tree->degree(), 3u);
     EXPECT_FALSE(tree->is_prefix());
-    // By hand: (origin + q) / 16, d^2 2^(e - 30), o |o| 2^(e - 30).
-    EXPECT_EQ(tree->ellipsoid(0), (Ellipsoid{{-20 / 16.f, 27 / 16.f, 1030 / 16.f},
+    // By hand: (origin + q + f / 32) / 16, d^2 2^(e - 30), o |o| 2^(e - 30).
+    EXPECT_EQ(tree->ellipsoid(0), (Ellipsoid{{-19.5f / 16, (27 + 1 / 32.f) / 16, (1030 + 31 / 32.f) / 16},
                                              4e4f * 4e4f * 0x1p-29f,
                                              -1e3f * 1e3f * 0x1p-29f,
                                              5e4f * 5e4f * 0x1p-29f,
                                              2e3f * 2e3f * 0x1p-29f,
                                              -3e3f * 3e3f * 0x1p-29f,
                                              6e4f * 6e4f * 0x1p-29f}));
-    EXPECT_EQ(tree->ellipsoid(8), (Ellipsoid{{-30 / 16.f, 7 / 16.f, 1000 / 16.f},
+    EXPECT_EQ(tree->ellipsoid(8), (Ellipsoid{{-30 / 16.f, 7.25f / 16, (1000 + 3 / 32.f) / 16},
                                              0x1p-30f,
                                              32767.f * 32767.f * 0x1p-30f,
                                              4 * 0x1p-30f,
@@ -360,11 +367,67 @@ TEST(Format, ABlockIsAStructureOfArrays) {
     expect_row(kExactBlock1 + 96, 2, {32767}); // off-diagonal
     expect_row(kExactBlock1 + 112, 2, {-32768});
     expect_row(kExactBlock1 + 128, 2, {});
-    expect_row(kExactBlock1 + 144, 1, {0, -7});  // exponent
-    expect_row(kExactBlock1 + 152, 1, {3, 129}); // three children; a leaf of one triangle
-    expect_row(kExactBlock1 + 160, 4, {16, 0});  // slot of the first child; first triangle
+    expect_row(kExactBlock1 + 144, 1, {0, -7});            // exponent
+    expect_row(kExactBlock1 + 152, 1, {3, 129});           // three children; a leaf of one triangle
+    expect_row(kExactBlock1 + 160, 2, {8 << 5 | 3 << 10}); // fractions
+    expect_row(kExactBlock1 + 176, 1, {});                 // blocks of children before
     expect_row(kExactBlock2 + 152, 1, {130, 129, 129});
-    expect_row(kExactBlock2 + 160, 4, {1, 3, 4});
+    const auto expect_words = [&](size_t at, uint32_t children, uint32_t triangles) { // where they begin
+        EXPECT_EQ(load_le<uint32_t>(bytes.data() + at + 184), children);
+        EXPECT_EQ(load_le<uint32_t>(bytes.data() + at + 188), triangles);
+    };
+    expect_words(kBounding, 1, 0);
+    expect_words(kExactBlock1, 2, 0);
+    expect_words(kExactBlock2, 3, 1);
+}
+
+// Against a plain sum, for all that open() accepts: up to 127 triangles a lane, leaves and inner nodes in any mix.
+TEST(Format, TrianglesOfALaneFollowThoseOfTheLanesBefore) {
+    Random random(7);
+    std::array<std::byte, kBlockBytes> block{};
+    for (int i = 0; i < 20'000; ++i) {
+        const uint32_t begin = random.below(1u << 31), leaves = random.below(3), most = random.below(2);
+        store_le(block.data() + kBlockTriangles, begin);
+        uint32_t before = 0;
+        for (size_t lane = 0; lane < kBlockLanes; ++lane) {
+            ASSERT_EQ(first_triangle(block.data(), lane), begin + before) << i << ' ' << lane;
+            uint32_t count = random.below(kMaxDegree + 1);
+            if (leaves == 0 || (leaves == 1 && random.below(2) != 0)) {
+                const uint32_t triangles = most != 0 ? kMaxLeafTriangles : 1 + random.below(kMaxLeafTriangles);
+                before += triangles;
+                count = kTriangleLeaf + triangles;
+            }
+            store_le(block.data() + kBlockCount + lane, static_cast<uint8_t>(count));
+        }
+    }
+}
+
+// Of centers, files hold what a float can: 24 bits from the coordinate origin on, within the lattice.
+TEST(Format, CentersTakeTheBitsThatAFloatHolds) {
+    for (const int32_t origin : {0, -65535, 1 << 18, (1 << 19) - 65535, (1 << 19) - 65534, -(1 << 19), -(1 << 19) - 1,
+                                 1 << 20, (1 << 23) - 65535, (1 << 23) - 65534, (1 << 24) - 65536, 1 - (1 << 24)}) {
+        const int bits = format::fraction_bits(origin);
+        for (const auto& [q, fraction] : std::initializer_list<std::pair<uint16_t, uint8_t>>{
+                 {0, 1}, {0, 2}, {0, 16}, {1, 31}, {32768, 8}, {65534, 31}, {65535, 0}, {65535, 1}}) {
+            PackedLevel root{{{.center = {q, 0, 0}, .fraction = {fraction, 0, 0}, .diagonal = {7, 7, 7}}}};
+            const Lattice lattice{{origin, 0, 0}, 0};
+            const auto tree = Tree::open(format::encode({}, 8, lattice, std::span(&root, 1)));
+            const double x = origin + q + fraction / 32.0;
+            const bool fits = static_cast<float>(x) == x && q + fraction / 32.0 <= 65535;
+            ASSERT_EQ(tree.has_value(), fits) << origin << ' ' << q << ' ' << int{fraction};
+            // A writer's grid holds what is on it, and nothing finer would be held all over the lattice.
+            EXPECT_TRUE(fits || fraction % (32 >> bits) != 0 || q == 65535);
+            if (fits) {
+                EXPECT_EQ(tree->view().ellipsoid(0).center.x, x);
+            } else {
+                EXPECT_EQ(tree.error().where, 320u + 160);
+                EXPECT_STREQ(tree.error().what,
+                             q == 65535 ? "a center lies beyond the lattice" : "a center has more bits than a float");
+            }
+        }
+        const double next = origin + 65535 - std::ldexp(1, -bits - 1), low = origin + std::ldexp(1, -bits - 1);
+        EXPECT_TRUE(bits == 5 || static_cast<float>(next) != next || static_cast<float>(low) != low) << origin;
+    }
 }
 
 TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
@@ -382,14 +445,16 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
     EXPECT_EQ(tree->children(8).first, 16u);
     EXPECT_EQ(tree->children(8).count, 9u);
     EXPECT_EQ(tree->children(10).first, 32u);
+    EXPECT_EQ(tree->raw().block(1)[176 + 2], std::byte{2}); // blocks of the first node's children
     std::vector<uint32_t> last;
     tree->for_each_node(2, [&](uint32_t n) { last.push_back(n); });
     EXPECT_EQ(last, (std::vector<uint32_t>{16, 17, 18, 19, 20, 21, 22, 23, 24, 32, 33, 34, 35, 36, 37, 38, 39}));
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree",
-                             "golden_v3_exact.etree", "golden_v4.etree", "golden_v4_exact.etree"}) {
+    for (const char* name :
+         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree",
+          "golden_v4.etree", "golden_v4_exact.etree", "golden_v5.etree", "golden_v5_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -491,11 +556,11 @@ TEST(Format, NamesTheFirstOffence) {
     const size_t exact_counts = kExactBlock1 + 152;
     const Case cases[] = {
         {0, {'E'}, ErrorCode::bad_file, 0},
-        {8, {4}, ErrorCode::bad_file, 8},
+        {8, {5}, ErrorCode::bad_file, 8},
         {kBlocks + 144, {18}, ErrorCode::bad_file, kBlocks + 144},         // 22 above the step exponent, -4
         {kBlocks + 144, {0xdd}, ErrorCode::bad_file, kBlocks + 144},       // 31 below
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
-        {8, {6}, ErrorCode::newer_version, 6},
+        {8, {7}, ErrorCode::newer_version, 7},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -540,34 +605,45 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
         {kBounding - 4, {1}, ErrorCode::bad_file, kBounding - 4},               // padding
         {kBounding - 1, {1}, ErrorCode::bad_file, kBounding - 1},
-        {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 160},     // other children than in the block
-        {kBounding + 160, {16}, ErrorCode::bad_file, kBounding + 160},    // another first child
+        {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 152}, // other children than in the block
+        {kBounding + 184, {2}, ErrorCode::bad_file, kBounding + 184}, // in other places
+        {kBounding + 188, {1}, ErrorCode::bad_file, kBounding + 188},
         {kBounding + 48, {0, 0}, ErrorCode::bad_file, kBounding + 48},    // no extent
         {kBounding + 144, {101}, ErrorCode::bad_file, kBounding + 144},   // exponent
         {kBounding + 192, {255}, ErrorCode::bad_file, kBounding + 192},   // lower corner above the upper one
         {kBounding + 243, {16}, ErrorCode::bad_file, kBounding + 240},    // box origin
         {kBounding + 50, {1}, ErrorCode::bad_file, kBounding + 50},       // beside the root
         {kBounding + 256 + 2, {1}, ErrorCode::bad_file, kBounding + 258}, // another center of a leaf
-        {kBlocks + 160, {9}, ErrorCode::bad_file, kBlocks + 160},         // first child
-        {counts, {4}, ErrorCode::bad_file, counts},                       // more children than the degree
-        {counts, {2}, ErrorCode::bad_file, kBlock1},                      // children that are not the next level
-        {kBlock1 + 144, {101}, ErrorCode::bad_file, kBlock1 + 144},       // exponent
-        {kBlock1 + 48, {0, 0}, ErrorCode::bad_file, kBlock1 + 48},        // no extent
-        {kBlock1 + 66, {0, 0}, ErrorCode::bad_file, kBlock1 + 66},        // of the other, along y
-        {kBlock1 + 164, {1}, ErrorCode::bad_file, kBlock1 + 164},         // a leaf's first child
-        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},             // a leaf of no triangles
-        {counts + 1, {129}, ErrorCode::bad_file, counts + 1},             // triangles in a tree without
-        {kBlocks + 2, {1}, ErrorCode::bad_file, kBlocks + 2},             // beside the root: center
-        {kBlocks + 80 + 15, {1}, ErrorCode::bad_file, kBlocks + 95},      // diagonal of the last lane
-        {kBlock1 + 96 + 4, {1}, ErrorCode::bad_file, kBlock1 + 100},      // off-diagonal
-        {kBlock1 + 144 + 2, {1}, ErrorCode::bad_file, kBlock1 + 146},     // exponent
-        {counts + 2, {1}, ErrorCode::bad_file, counts + 2},               // count
-        {kBlock2 + 191, {1}, ErrorCode::bad_file, kBlock2 + 191},         // first
-        {kBlocks + 193, {1}, ErrorCode::bad_file, kBlocks + 193},         // box
-        {kBlock1 + 192, {255}, ErrorCode::bad_file, kBlock1 + 192},       // lower corner above the upper one
-        {kBlocks + 243, {16}, ErrorCode::bad_file, kBlocks + 240},        // box origin
-        {kBlocks + 252, {23}, ErrorCode::bad_file, kBlocks + 252},        // box step
-        {kBlocks + 255, {1}, ErrorCode::bad_file, kBlocks + 255},         // reserved
+        {kBounding + 256 + 162, {1}, ErrorCode::bad_file, kBounding + 258},
+        {kBounding + 163, {1}, ErrorCode::bad_file, kBounding + 163}, // beside the root: fraction
+        {kBounding + 176, {1}, ErrorCode::bad_file, kBounding + 176}, // another first child
+        {kBounding + 183, {1}, ErrorCode::bad_file, kBounding + 183}, // beside the root
+        {kBlocks + 161, {0x80}, ErrorCode::bad_file, kBlocks + 160},  // the bit that no coordinate has
+        {kBlocks + 176, {1}, ErrorCode::bad_file, kBlocks + 176},     // first child
+        {kBlock1 + 177, {1}, ErrorCode::bad_file, kBlock1 + 177},     // of a leaf
+        {kBlocks + 184, {2}, ErrorCode::bad_file, kBlocks + 184},     // where the children begin
+        {kBlocks + 188, {1}, ErrorCode::bad_file, kBlocks + 188},     // and the triangles
+        {counts, {4}, ErrorCode::bad_file, counts},                   // more children than the degree
+        {counts, {2}, ErrorCode::bad_file, kBlock1},                  // children that are not the next level
+        {kBlock1 + 144, {101}, ErrorCode::bad_file, kBlock1 + 144},   // exponent
+        {kBlock1 + 48, {0, 0}, ErrorCode::bad_file, kBlock1 + 48},    // no extent
+        {kBlock1 + 66, {0, 0}, ErrorCode::bad_file, kBlock1 + 66},    // of the other, along y
+        {kBlock1 + 162, {1}, ErrorCode::bad_file, kBlock1 + 162},     // a center beyond the lattice
+        {counts + 1, {128}, ErrorCode::bad_file, counts + 1},         // a leaf of no triangles
+        {counts + 1, {129}, ErrorCode::bad_file, counts + 1},         // triangles in a tree without
+        {kBlocks + 2, {1}, ErrorCode::bad_file, kBlocks + 2},         // beside the root: center
+        {kBlocks + 80 + 15, {1}, ErrorCode::bad_file, kBlocks + 95},  // diagonal of the last lane
+        {kBlock1 + 96 + 4, {1}, ErrorCode::bad_file, kBlock1 + 100},  // off-diagonal
+        {kBlock1 + 144 + 2, {1}, ErrorCode::bad_file, kBlock1 + 146}, // exponent
+        {counts + 2, {1}, ErrorCode::bad_file, counts + 2},           // count
+        {kBlock2 + 175, {1}, ErrorCode::bad_file, kBlock2 + 175},     // fraction
+        {kBlock2 + 183, {1}, ErrorCode::bad_file, kBlock2 + 183},     // blocks before
+        {kBlock2 + 187, {1}, ErrorCode::bad_file, kBlock2 + 184},     // where children begin, of the last level
+        {kBlocks + 193, {1}, ErrorCode::bad_file, kBlocks + 193},     // box
+        {kBlock1 + 192, {255}, ErrorCode::bad_file, kBlock1 + 192},   // lower corner above the upper one
+        {kBlocks + 243, {16}, ErrorCode::bad_file, kBlocks + 240},    // box origin
+        {kBlocks + 252, {23}, ErrorCode::bad_file, kBlocks + 252},    // box step
+        {kBlocks + 255, {1}, ErrorCode::bad_file, kBlocks + 255},     // reserved
     };
     const Case exact_cases[] = {
         {12, {1}, ErrorCode::bad_file, 116},                                  // triangle counts of a tree without
@@ -578,9 +654,9 @@ TEST(Format, NamesTheFirstOffence) {
         {124, {8}, ErrorCode::bad_file, 124},                                 // more than vertices
         {exact_counts + 1, {0}, ErrorCode::bad_file, exact_counts + 1},       // a leaf of none
         {exact_counts + 1, {128}, ErrorCode::bad_file, exact_counts + 1},     // another of none
-        {exact_counts + 1, {130}, ErrorCode::bad_file, kExactBlock2 + 160},   // one that the next leaf has too
+        {exact_counts + 1, {130}, ErrorCode::bad_file, kExactBlock2 + 188},   // one that the next leaf has too
         {kExactBlock2 + 154, {130}, ErrorCode::bad_file, 120},                // one more than there are
-        {exact_counts, {131}, ErrorCode::bad_file, kExactBlock1 + 160},       // an inner node's children as triangles
+        {exact_counts, {131}, ErrorCode::bad_file, kExactBlock1},             // an inner node's children as triangles
         {kExactEnd + 64 + 49, {1}, ErrorCode::bad_file, kExactEnd + 64 + 49}, // reserved bytes of a hull
         {kExactEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kExactEnd + 2 * 64 + 63},            // likewise
         {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
@@ -604,11 +680,13 @@ TEST(Format, DecodingIsExact) {
         Lattice lattice;
         for (int32_t& o : lattice.origin)
             o = static_cast<int32_t>(random.below(2 * format::kMaxCoordinate - 65536)) - format::kMaxCoordinate + 1;
-        lattice.step_exponent = static_cast<int32_t>(random.below(181)) - 120;
+        lattice.step_exponent = static_cast<int32_t>(random.below(173)) - 112;
         PackedNode node;
         node.exponent = static_cast<int8_t>(static_cast<int>(random.below(191)) - 90);
         for (size_t k = 0; k < 3; ++k) {
-            node.center[k] = bits16();
+            node.center[k] = static_cast<uint16_t>(random.below(65535));
+            node.fraction[k] =
+                static_cast<uint8_t>((random.next() << (5 - format::fraction_bits(lattice.origin[k]))) % 32);
             node.diagonal[k] = std::max<uint16_t>(1, bits16());
             node.off_diagonal[k] = static_cast<int16_t>(bits16());
         }
@@ -616,7 +694,8 @@ TEST(Format, DecodingIsExact) {
         const float center[3] = {e.center.x, e.center.y, e.center.z}, diagonal[3] = {e.l11, e.l22, e.l33},
                     off[3] = {e.l21, e.l31, e.l32};
         for (size_t k = 0; k < 3; ++k) {
-            ASSERT_EQ(center[k], std::ldexp(1.0 * lattice.origin[k] + node.center[k], lattice.step_exponent));
+            ASSERT_EQ(center[k],
+                      std::ldexp(lattice.origin[k] + node.center[k] + node.fraction[k] / 32.0, lattice.step_exponent));
             // One rounding, to a float.
             const auto d = static_cast<float>(node.diagonal[k]), o = static_cast<float>(node.off_diagonal[k]);
             ASSERT_EQ(diagonal[k], std::ldexp(d * d, node.exponent - 30));
@@ -651,7 +730,12 @@ TEST(Format, QuantisingTakesTheNearest) {
         format::quantise(node, lattice, center, factor);
         const Ellipsoid e = format::decode(node, lattice);
         const float decoded[3] = {e.center.x, e.center.y, e.center.z};
-        for (size_t k = 0; k < 3; ++k) ASSERT_LE(std::abs(decoded[k] - center[k]), step / 2) << i;
+        for (size_t k = 0; k < 3; ++k) { // 21 bits across, and 24 from zero
+            ASSERT_LE(std::abs(decoded[k] - center[k]),
+                      std::ldexp(step / 2, -format::fraction_bits(lattice.origin[k])));
+            ASSERT_LE(std::abs(decoded[k] - center[k]),
+                      std::max(step / 64, (std::max(std::abs(low[k]), std::abs(high[k])) + 65536 * step) * 0x1p-24));
+        }
         const double unit = std::ldexp(1, node.exponent - 30);
         const float decoded_factor[6] = {e.l11, e.l21, e.l22, e.l31, e.l32, e.l33};
         double largest = 0;
@@ -669,7 +753,7 @@ TEST(Format, QuantisingTakesTheNearest) {
             extent = std::max(extent, high[k] - low[k]);
             reach = std::max({reach, std::abs(low[k]), std::abs(high[k])});
         }
-        ASSERT_LE(step, std::max({extent * 0x1p-14, reach * 0x1p-22, 0x1p-120})) << i;
+        ASSERT_LE(step, std::max({extent * 0x1p-14, reach * 0x1p-22, 0x1p-112})) << i;
     }
 }
 
@@ -799,7 +883,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 5); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 6); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

@@ -39,9 +39,11 @@ bool root_box_holds_center(const TreeView& tree) {
     for (size_t i = 0; i < 3; ++i) {
         const auto at = [&](size_t array) { return int64_t{load_le<uint8_t>(block + array + kBlockLanes * i)}; };
         const int64_t origin = load_le<int32_t>(block + kBlockBoxOrigin + 4 * i);
-        const int64_t center = load_le<uint16_t>(block + block_offset(kBlockCenter, i, 0)) - origin;
+        const int64_t center = stored_center(block, i, 0) - origin * kCenterUnits;
         const auto exponent = load_le<uint8_t>(block + kBlockBoxExponent + i);
-        if (center < at(kBlockBoxLow) << exponent || center > at(kBlockBoxHigh) << exponent) return false;
+        if (center < (at(kBlockBoxLow) << exponent) * kCenterUnits ||
+            center > (at(kBlockBoxHigh) << exponent) * kCenterUnits)
+            return false;
     }
     return true;
 }

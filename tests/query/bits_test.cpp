@@ -113,7 +113,7 @@ TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
 }
 
 TEST(Bits, Collide) {
-    expect_bits(9362485285461351817u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(17069838017463300795u, [](Bits& bits, const Scenes::Pair& p) {
         const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
         PairCache cache;
@@ -126,7 +126,7 @@ TEST(Bits, Collide) {
 }
 
 TEST(Bits, CollideAll) {
-    expect_bits(8282181647875842399u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(3770396131516776320u, [](Bits& bits, const Scenes::Pair& p) {
         MeetingPair pairs[16];
         const CollideAllResult r = collide_all(p.a, p.pose_a, p.b, p.pose_b, pairs, context());
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats);
@@ -135,14 +135,14 @@ TEST(Bits, CollideAll) {
 }
 
 TEST(Bits, Distance) {
-    expect_bits(2731207374674907494u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(13850290179038976019u, [](Bits& bits, const Scenes::Pair& p) {
         const DistanceResult r = distance(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.lower, r.upper, r.point_a, r.point_b, r.normal, r.pair, r.stats);
     });
 }
 
 TEST(Bits, Contacts) {
-    expect_bits(10575326396721607079u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(17965809007798257232u, [](Bits& bits, const Scenes::Pair& p) {
         ContactManifolds manifolds;
         const ContactResult r = contacts(p.a, p.pose_a, p.b, p.pose_b, manifolds, context(), {.margin = 0.01f});
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats, manifolds.count);
@@ -158,7 +158,7 @@ TEST(Bits, Contacts) {
 }
 
 TEST(Bits, Sweep) {
-    expect_bits(13677036498990831651u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(16882116511383713749u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_b.translation, to = p.pose_a.translation;
         const Motion a{p.pose_a, {}, {0.3f, -1, 0.2f}, {}};
         const Motion b{p.pose_b, {to.x - from.x, to.y - from.y, to.z - from.z}, {1, 2, -0.5f}, {}};
@@ -169,7 +169,7 @@ TEST(Bits, Sweep) {
 }
 
 TEST(Bits, Raycast) {
-    expect_bits(7325182306009168009u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(33901660525487819u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
         const Ray ray{from, {to.x - from.x, to.y - from.y, to.z - from.z}, 2};
         for (const float margin : {0.0f, 0.05f}) {
@@ -180,7 +180,7 @@ TEST(Bits, Raycast) {
 }
 
 TEST(Bits, Overlap) {
-    expect_bits(10210352043080013176u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(7552293217359177587u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
         const auto add = [&](const auto& shape) {
             const OverlapResult r = overlap(p.b, p.pose_b, shape, context());
@@ -194,7 +194,7 @@ TEST(Bits, Overlap) {
 }
 
 TEST(Bits, PairsOfEllipsoids) {
-    expect_bits(17926265321563129440u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(17873534165635833303u, [](Bits& bits, const Scenes::Pair& p) {
         const Ellipsoid a = p.a.ellipsoid(0), b = p.b.ellipsoid(0);
         const PairDistance d = distance(a, p.pose_a, b, p.pose_b);
         bits.add_all(collide(a, p.pose_a, b, p.pose_b), d.lower, d.upper, d.normal, d.point_a, d.point_b);
@@ -221,12 +221,12 @@ TEST(Bits, BatchesOfEllipsoids) {
         Bits bits;
         for (const Verdict v : verdicts) bits.add(v);
         for (const PairDistance& d : distances) bits.add_all(d.lower, d.upper, d.normal, d.point_a, d.point_b);
-        EXPECT_EQ(bits.hash(), 12822368507470557986u) << target;
+        EXPECT_EQ(bits.hash(), 5758939381866085698u) << target;
     });
 }
 
 TEST(Bits, Bounds) {
-    expect_bits(4826551120391282390u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(2981268794259395762u, [](Bits& bits, const Scenes::Pair& p) {
         const Bounds box = bounds(p.a, p.pose_a);
         bits.add_all(box.lower, box.upper);
     });

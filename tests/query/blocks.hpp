@@ -42,12 +42,7 @@ inline Block block(Random& random, double ratio) {
         format::PackedNode packed;
         format::quantise(packed, out.lattice, center, factor);
         out.ellipsoids[lane] = format::decode(packed, out.lattice);
-        for (size_t i = 0; i < 3; ++i) {
-            store_le(out.bytes.data() + block_offset(kBlockCenter, i, lane), packed.center[i]);
-            store_le(out.bytes.data() + block_offset(kBlockDiagonal, i, lane), packed.diagonal[i]);
-            store_le(out.bytes.data() + block_offset(kBlockOffDiagonal, i, lane), packed.off_diagonal[i]);
-        }
-        store_le(out.bytes.data() + kBlockExponent + lane, packed.exponent);
+        format::store_node(out.bytes.data(), lane, packed);
         nodes.push_back(packed);
     }
     format::store_boxes(out.bytes.data(), nodes, out.lattice);

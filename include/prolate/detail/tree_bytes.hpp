@@ -12,10 +12,11 @@ class TreeView;
 inline constexpr size_t kBlockBytes = 256; ///< bytes of one block in the file
 inline constexpr size_t kHullBytes = 64;   ///< bytes of one hull record in the file
 
-/// The lattice that the nodes' centers lie on: center_i = (origin_i + q_i) * 2^step_exponent metres, q_i as stored.
+/// The lattice that the nodes' centers lie on: center_i = (origin_i + q_i) * 2^step_exponent metres, q_i as stored,
+/// in 32nds.
 struct LatticeInfo {
-    int32_t origin[3] = {};    ///< |origin_i + q_i| < 2^24: an integer that a float holds exactly
-    int32_t step_exponent = 0; ///< -120 ... 60
+    int32_t origin[3] = {};    ///< |origin_i + q_i| < 2^24, and a float holds the sum exactly
+    int32_t step_exponent = 0; ///< -112 ... 60
 };
 
 namespace detail {

@@ -113,12 +113,7 @@ Block make(Random& random, double body, const Family& family) {
         format::PackedNode packed;
         format::quantise(packed, out.lattice, center, factor);
         out.ellipsoids[lane] = format::decode(packed, out.lattice);
-        for (size_t i = 0; i < 3; ++i) {
-            store_le(out.bytes.data() + block_offset(kBlockCenter, i, lane), packed.center[i]);
-            store_le(out.bytes.data() + block_offset(kBlockDiagonal, i, lane), packed.diagonal[i]);
-            store_le(out.bytes.data() + block_offset(kBlockOffDiagonal, i, lane), packed.off_diagonal[i]);
-        }
-        store_le(out.bytes.data() + kBlockExponent + lane, packed.exponent);
+        format::store_node(out.bytes.data(), lane, packed);
     }
     return out;
 }

@@ -97,12 +97,7 @@ Block block(Random& random, double body, const Family& family) {
         format::PackedNode& node = nodes[lane];
         format::quantise(node, out.lattice, center, factor);
         out.ellipsoids[lane] = format::decode(node, out.lattice);
-        for (size_t i = 0; i < 3; ++i) {
-            store_le(out.bytes.data() + block_offset(kBlockCenter, i, lane), node.center[i]);
-            store_le(out.bytes.data() + block_offset(kBlockDiagonal, i, lane), node.diagonal[i]);
-            store_le(out.bytes.data() + block_offset(kBlockOffDiagonal, i, lane), node.off_diagonal[i]);
-        }
-        store_le(out.bytes.data() + kBlockExponent + lane, node.exponent);
+        format::store_node(out.bytes.data(), lane, node);
     }
     format::store_boxes(out.bytes.data(), nodes, out.lattice);
     return out;
