@@ -6,7 +6,7 @@
 #include "cli/outputs.hpp"
 #include "cli/pose.hpp"
 #include "cli/progress_line.hpp"
-#include "cli/render/panel.hpp"
+#include "cli/render/camera.hpp"
 #include "cli/threads.hpp"
 #include "cli/view/scene.hpp"
 #include "cli/words.hpp"

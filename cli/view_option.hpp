@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cli/failure.hpp"
-#include "cli/render/panel.hpp"
+#include "cli/render/camera.hpp"
 
 #include <string>
 

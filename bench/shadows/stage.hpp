@@ -2,7 +2,7 @@
 #pragma once
 
 #include "bench/shadows/shadow.hpp"
-#include "cli/render/panel.hpp"
+#include "cli/render/camera.hpp"
 
 namespace prolate::bench {
 

@@ -6,7 +6,7 @@
 #pragma once
 
 #include "cli/export/sphere.hpp"
-#include "cli/render/panel.hpp"
+#include "cli/render/camera.hpp"
 
 #include <prolate/tree.hpp>
 

@@ -3,6 +3,7 @@
 
 #include "cli/render/heat.hpp"
 #include "cli/render/palette.hpp"
+#include "cli/render/panel.hpp"
 #include "cli/render/scene_cut.hpp"
 #include "cli/render/scene_mesh.hpp"
 #include "cli/render/solid.hpp"

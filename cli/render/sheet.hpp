@@ -2,8 +2,8 @@
 // through both, or how far each level sticks out of the mesh.
 #pragma once
 
+#include "cli/render/camera.hpp"
 #include "cli/render/image.hpp"
-#include "cli/render/panel.hpp"
 
 #include <prolate/error.hpp>
 
