@@ -3,6 +3,7 @@
 #include <prolate/verify.hpp>
 
 #include "builder/cover.hpp"
+#include "builder/effort.hpp"
 #include "builder/exact.hpp"
 #include "builder/grow.hpp"
 #include "builder/hausdorff.hpp"
@@ -36,9 +37,6 @@ constexpr double kCellsPerLeaf = 24;      // of the coarser grid that the optimi
 constexpr uint32_t kLeastCells = 48;      // of that grid, along the longest side
 constexpr int kMeterColumns = 192;        // to compare covers while baking
 constexpr int kMeasureColumns = 512;      // of the reported figures
-// How exactly distances are measured, by quality.
-constexpr double kDistanceTolerance[] = {1e-3, 1e-4, 1e-4};  // of the largest one, in diagonals
-constexpr uint32_t kDistanceSamples[] = {2000, 8000, 32000}; // for mean and percentile
 
 // A solid of less than this share of its diagonal's cube has no inside worth the name.
 constexpr double kNoInside = 1e-12;
@@ -167,9 +165,7 @@ private:
         }
         return area;
     }
-    double distance_tolerance() const {
-        return kDistanceTolerance[static_cast<size_t>(options_.quality)] * box_.size().norm();
-    }
+    double distance_tolerance() const { return effort_.distance_tolerance * box_.size().norm(); }
     double min_radius() const {
         const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
         return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
@@ -313,8 +309,8 @@ private:
                     relative(volume.outside.error) + figure.outside_ratio * relative(solid_.error);
                 figure.sum_outside_ratio = relative(volume.sum_outside.value);
             }
-            const HausdorffDistance distance = hausdorff_distance(
-                cut, winding, closed_, distance_tolerance(), kDistanceSamples[static_cast<size_t>(options_.quality)]);
+            const HausdorffDistance distance =
+                hausdorff_distance(cut, winding, closed_, distance_tolerance(), effort_.distance_samples);
             figure.hausdorff_max = distance.max + distance.max_error;
             figure.hausdorff_mean = distance.mean;
             figure.hausdorff_p99 = distance.p99;

@@ -20,9 +20,8 @@ public:
     /// Keeps `fits`.
     explicit CentralTree(std::span<const Fit> fits);
 
-    /// The ellipsoid i with admit(i) whose radial_squared(p) is least, and below `least`; the first of equal ones.
-    /// Thread-safe.
-    template <class Admit> std::optional<uint32_t> find(const Vec& p, double least, Admit&& admit) const {
+    /// The ellipsoid i whose radial_squared(p) is least, and below `least`; the first of equal ones. Thread-safe.
+    std::optional<uint32_t> find(const Vec& p, double least) const {
         std::optional<uint32_t> found;
         std::array<uint32_t, 64> stack; // one waits on each level, and the tree is balanced
         size_t waiting = 0;
@@ -34,8 +33,7 @@ public:
                 for (uint32_t k = node.begin; k < node.end; ++k) {
                     const uint32_t i = order_[k];
                     const double radial = fits_[i].radial_squared(p);
-                    if ((radial < least || (radial == least && found && i < *found)) && admit(i))
-                        least = radial, found = i;
+                    if (radial < least || (radial == least && found && i < *found)) least = radial, found = i;
                 }
                 continue;
             }

@@ -46,9 +46,9 @@ Coordinates coordinates_of(const Vec& s, const Mat& g) {
 
 class Descent {
 public:
-    Descent(EllipsoidSet& set, const DistanceField& field, std::span<const Vec> points, std::vector<uint32_t> owner,
-            const DescentOptions& options)
-        : set_(set), fits_(set.fits), field_(field), points_(points), owner_(std::move(owner)), options_(options),
+    Descent(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
+            std::vector<uint32_t> owner, const DescentOptions& options)
+        : fits_(fits), field_(field), points_(points), owner_(std::move(owner)), options_(options),
           random_(options.seed), directions_(even_directions(options.directions)), rotated_(directions_.size()),
           multiplier_(points.size(), 0), momentum_(fits_.size()) {}
 
@@ -91,29 +91,17 @@ private:
         step_ = kFirstStep * s * s * std::min(1.0, 10 / options_.first_kappa);
     }
 
-    bool in_chain(size_t i, const Vec& p) const {
-        for (const Fit& ancestor : set_.chain(i))
-            if (ancestor.radial_squared(p) > 1) return false;
-        return true;
-    }
-
     // Weight of the border point x of ellipsoid i; `hint` is the neighbour that hid the last one.
     double weight(size_t i, const Vec& x, size_t& hint) const {
         const std::vector<uint32_t>& others = neighbours_[i];
-        bool hidden = false;
         for (size_t n = 0; n < others.size(); ++n) {
             const size_t at = n == 0 ? hint : n == hint ? 0 : n; // the hint first
-            const uint32_t other = others[at];
-            if (fits_[other].radial_squared(x) >= 1) continue;
-            hidden = true;
-            if (in_chain(other, x)) {
-                hint = at;
-                return 0;
-            }
+            if (fits_[others[at]].radial_squared(x) >= 1) continue;
+            hint = at;
+            return 0;
         }
         const double d = field_(x);
-        if (d > 0) return hidden ? 0 : options_.objective(d);
-        return in_chain(i, x) ? -kappa_ : 0;
+        return d > 0 ? options_.objective(d) : -kappa_;
     }
 
     Fit step(size_t i) {
@@ -171,34 +159,26 @@ private:
     }
 
     // Radial coordinate of the point in its owner. Among the owner and its neighbours, the most central one becomes
-    // the owner; one whose ancestors do not have the point cannot.
+    // the owner.
     double find_owner(size_t p) {
         const Vec& x = points_[p];
         const uint32_t old = owner_[p];
         double nearest = fits_[old].radial_squared(x);
-        const bool may_have_it = in_chain(old, x);
-        if (nearest > 1 || !may_have_it) {
-            if (!may_have_it) nearest = HUGE_VAL;
+        if (nearest > 1)
             for (const uint32_t other : neighbours_[old])
-                if (const double radial = fits_[other].radial_squared(x); radial < nearest && in_chain(other, x))
+                if (const double radial = fits_[other].radial_squared(x); radial < nearest)
                     nearest = radial, owner_[p] = other;
-            if (nearest == HUGE_VAL) nearest = 1; // none that may have it is near: not to be moved by this point
-        }
         return std::sqrt(nearest);
     }
 
-    // Points whose owner has moved away for good, or may not have them, look for the most central one of all.
+    // Points whose owner has moved away for good look for the most central one of all.
     void find_lost_points() {
         constexpr double kLost = 3;
         const CentralTree tree(fits_);
         tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
             for (size_t p = range.begin(); p != range.end(); ++p) {
                 const double radial = fits_[owner_[p]].radial_squared(points_[p]);
-                const bool may_have_it = in_chain(owner_[p], points_[p]);
-                if (radial < kLost * kLost && may_have_it) continue;
-                const auto found = tree.find(points_[p], may_have_it ? radial : HUGE_VAL,
-                                             [&](uint32_t i) { return in_chain(i, points_[p]); });
-                owner_[p] = found.value_or(owner_[p]);
+                if (radial >= kLost * kLost) owner_[p] = tree.find(points_[p], radial).value_or(owner_[p]);
             }
         });
     }
@@ -213,17 +193,18 @@ private:
         std::stable_sort(by_use.begin(), by_use.end(), [&](uint32_t a, uint32_t b) { return covers[a] < covers[b]; });
         std::stable_sort(by_need.begin(), by_need.end(),
                          [&](uint32_t a, uint32_t b) { return outside[a] > outside[b]; });
+        const std::span<const uint32_t> family = options_.family;
         std::vector<bool> done(fits_.size(), false);
         size_t made = 0;
         const size_t limit = std::max<size_t>(1, fits_.size() / 16);
         for (const uint32_t from : by_use) {
             if (made == limit) break;
             const auto to = std::find_if(by_need.begin(), by_need.end(), [&](uint32_t b) {
-                return !done[b] && b != from && (set_.parent.empty() || set_.parent[b] == set_.parent[from]);
+                return !done[b] && b != from && (family.empty() || family[b] == family[from]);
             });
             if (to == by_need.end() || done[from]) continue;
             if (covers[from] > kUseless * outside[*to]) {
-                if (set_.parent.empty()) break;
+                if (family.empty()) break;
                 continue;
             }
             done[from] = done[*to] = true, ++made;
@@ -282,7 +263,6 @@ private:
         Mat g;
     };
 
-    const EllipsoidSet& set_;
     std::vector<Fit>& fits_;
     const DistanceField& field_;
     std::span<const Vec> points_;
@@ -301,9 +281,9 @@ private:
 
 } // namespace
 
-void descend(EllipsoidSet& set, const DistanceField& field, std::span<const Vec> points, std::vector<uint32_t> owner,
-             const DescentOptions& options) {
-    Descent(set, field, points, std::move(owner), options).run();
+void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
+             std::vector<uint32_t> owner, const DescentOptions& options) {
+    Descent(fits, field, points, std::move(owner), options).run();
 }
 
 std::vector<Vec> even_directions(int count) {

@@ -40,19 +40,6 @@ struct Objective {
     double operator()(double d) const { return beta + alpha * (d / scale) * (d / scale); }
 };
 
-/// Ellipsoids and what limits them.
-struct EllipsoidSet {
-    std::vector<Fit> fits;
-    /// Empty, or for each ellipsoid the index of its parent in `chains`.
-    std::vector<uint32_t> parent;
-    /// Ellipsoids of a parent and its ancestors: a child covers only what all of these cover too.
-    std::vector<std::vector<Fit>> chains;
-
-    std::span<const Fit> chain(size_t i) const {
-        return parent.empty() ? std::span<const Fit>() : std::span<const Fit>(chains[parent[i]]);
-    }
-};
-
 struct DescentOptions {
     Objective objective;
     Primitive primitive;
@@ -62,13 +49,15 @@ struct DescentOptions {
     bool relocate;      ///< let ellipsoids that are of little use help where the error is worst
     double first_kappa; ///< 1 for a start from scratch; more to stay near the start
     uint64_t seed;
+    /// Empty, or a number for each ellipsoid: one helps only such as have the same.
+    std::span<const uint32_t> family = {};
     std::function<void(double)> progress = {}; ///< called now and then with the share that is done
 };
 
 /// Lowers J. `points` on the surface are to be covered; owner[p] is an ellipsoid near points[p]. The result depends on
 /// no number of threads. It covers nearly everything; polish() does the rest.
-void descend(EllipsoidSet& set, const DistanceField& field, std::span<const Vec> points, std::vector<uint32_t> owner,
-             const DescentOptions& options);
+void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
+             std::vector<uint32_t> owner, const DescentOptions& options);
 
 /// Directions evenly spread over the sphere (a Fibonacci lattice, Gonzalez 2010), by arithmetic that is the same on
 /// every machine.

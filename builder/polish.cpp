@@ -19,8 +19,7 @@ constexpr double kMargin = 1.2;       // ellipsoids may grow so much before neig
 constexpr int kNeighbourInterval = 4; // sweeps
 constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
 constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
-constexpr double kAncestorCost = 10;  // of a volume by which an ancestor grows: all its descendants' queries meet it
-constexpr double kAlmostCapped = 0.9; // of the largest axis ratio of steps
+constexpr double kAlmostCapped = 0.9;                 // of the largest axis ratio of steps
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -32,12 +31,6 @@ bool holds(const Fit& fit, double shortest_inverse, const Pieces& pieces, uint32
     if (radial - spread > 1.01) return false;
     for (const Vec& p : pieces.points(piece))
         if (fit.radial_squared(p) > held) return false;
-    return true;
-}
-
-bool chain_holds(const EllipsoidSet& set, size_t i, const Pieces& pieces, uint32_t piece) {
-    for (const Fit& ancestor : set.chain(i))
-        if (!holds(ancestor, ancestor.inverse.norm(), pieces, piece)) return false;
     return true;
 }
 
@@ -95,8 +88,8 @@ Step nearest_admitted(const Step& wanted, std::vector<Constraint>& constraints) 
 
 class Polisher {
 public:
-    Polisher(EllipsoidSet& set, const Pieces& pieces, const DistanceField& field, const PolishOptions& options)
-        : set_(set), fits_(set.fits), pieces_(pieces), field_(field), options_(options), random_(options.seed),
+    Polisher(std::vector<Fit>& fits, const Pieces& pieces, const DistanceField& field, const PolishOptions& options)
+        : fits_(fits), pieces_(pieces), field_(field), options_(options), random_(options.seed),
           directions_(even_directions(options.directions)), rotated_(directions_.size()), candidates_(fits_.size()),
           held_(fits_.size()), needed_by_(pieces.size(), kNobody) {}
 
@@ -160,7 +153,7 @@ private:
                 const Vec& c = pieces_.center(piece);
                 const double r = pieces_.radius(piece);
                 if (((c - box.low).array() < -r).any() || ((box.high - c).array() < -r).any()) return;
-                if (chain_holds(set_, i, pieces_, piece)) candidates_[i].push_back(piece);
+                candidates_[i].push_back(piece);
             });
             find_held(i);
         });
@@ -193,14 +186,12 @@ private:
             if (held_[i][c]) holders_[candidates_[i][c]] = static_cast<uint16_t>(holders_[candidates_[i][c]] + by);
     }
 
-    // A piece that nobody holds goes to the ellipsoid whose growth costs the least volume; that may be one whose
-    // ancestors have to grow, too.
+    // A piece that nobody holds goes to the ellipsoid whose growth costs the least volume.
     void adopt_orphans() {
         std::vector<double> least(pieces_.size(), HUGE_VAL);
         const double far = kMargin * kMargin * kMargin - 1;
         const auto offer = [&](uint32_t i, uint32_t piece) {
-            double growth = growth_of(fits_[i], piece);
-            for (const Fit& ancestor : set_.chain(i)) growth += kAncestorCost * growth_of(ancestor, piece);
+            const double growth = growth_of(fits_[i], piece);
             if (growth < least[piece]) least[piece] = growth, needed_by_[piece] = i;
         };
         for (uint32_t i = 0; i < fits_.size(); ++i)
@@ -211,12 +202,7 @@ private:
             if (holders_[piece] > 0) continue;
             if (needed_by_[piece] == kNobody || least[piece] > far * fits_[needed_by_[piece]].volume()) // look at all
                 for (uint32_t i = 0; i < fits_.size(); ++i) offer(i, piece);
-            const uint32_t i = needed_by_[piece];
-            candidates_[i].push_back(piece);
-            if (set_.parent.empty()) continue;
-            for (Fit& ancestor : set_.chains[set_.parent[i]])
-                if (const double reach = ancestor.reach(pieces_.points(piece)); reach > 1)
-                    ancestor = ancestor.scaled(reach * (1 + kSlack));
+            candidates_[needed_by_[piece]].push_back(piece);
         }
         for (size_t i = 0; i < fits_.size(); ++i) {
             std::sort(candidates_[i].begin(), candidates_[i].end());
@@ -328,7 +314,6 @@ private:
         if (best_.empty() || error < best_error_) best_ = fits_, best_error_ = error;
     }
 
-    EllipsoidSet& set_;
     std::vector<Fit>& fits_;
     const Pieces& pieces_;
     const DistanceField& field_;
@@ -346,11 +331,11 @@ private:
 };
 
 // What is as thin as steps may make it, though its pieces may be thinner: the least ellipsoid around them instead.
-void thin_out(EllipsoidSet& set, const Pieces& pieces, std::span<const uint32_t> owner, double min_radius) {
-    std::vector<std::vector<uint32_t>> owned(set.fits.size());
+void thin_out(std::vector<Fit>& fits, const Pieces& pieces, std::span<const uint32_t> owner, double min_radius) {
+    std::vector<std::vector<uint32_t>> owned(fits.size());
     for (uint32_t piece = 0; piece < owner.size(); ++piece) owned[owner[piece]].push_back(piece);
-    parallel_for(size_t{0}, set.fits.size(), [&](size_t i) {
-        Fit& fit = set.fits[i];
+    parallel_for(size_t{0}, fits.size(), [&](size_t i) {
+        Fit& fit = fits[i];
         if (owned[i].empty() || within_caps(fit, 0, kAlmostCapped * kMaxGuidedRatio)) return;
         const Fit least = fit_pieces(pieces, owned[i], min_radius);
         if (least.volume() < fit.volume()) fit = least;
@@ -359,19 +344,18 @@ void thin_out(EllipsoidSet& set, const Pieces& pieces, std::span<const uint32_t>
 
 } // namespace
 
-void refine_seams(Pieces& pieces, const EllipsoidSet& set) {
+void refine_seams(Pieces& pieces, std::span<const Fit> fits) {
     std::vector<bool> settled;
     for (;;) {
         const uint32_t count = pieces.size();
-        std::vector<std::vector<uint32_t>> held(set.fits.size());
+        std::vector<std::vector<uint32_t>> held(fits.size());
         const size_t known = settled.size();
-        parallel_for(size_t{0}, set.fits.size(), [&](size_t i) {
-            const Fit large = set.fits[i].scaled(kNearlyHeld);
+        parallel_for(size_t{0}, fits.size(), [&](size_t i) {
+            const Fit large = fits[i].scaled(kNearlyHeld);
             const double shortest_inverse = large.inverse.norm();
             pieces.for_each_near(box_of(large, 1), [&](uint32_t piece) {
                 if (piece < known && settled[piece]) return;
-                if (holds(large, shortest_inverse, pieces, piece) && chain_holds(set, i, pieces, piece))
-                    held[i].push_back(piece);
+                if (holds(large, shortest_inverse, pieces, piece)) held[i].push_back(piece);
             });
         });
         settled.resize(count, false);
@@ -389,12 +373,12 @@ void refine_seams(Pieces& pieces, const EllipsoidSet& set) {
     }
 }
 
-std::vector<uint32_t> polish(EllipsoidSet& set, const Pieces& pieces, const DistanceField& field,
+std::vector<uint32_t> polish(std::vector<Fit>& fits, const Pieces& pieces, const DistanceField& field,
                              const PolishOptions& options) {
-    Polisher polisher(set, pieces, field, options);
+    Polisher polisher(fits, pieces, field, options);
     polisher.run();
     std::vector<uint32_t> owner = polisher.owners();
-    thin_out(set, pieces, owner, options.min_radius);
+    thin_out(fits, pieces, owner, options.min_radius);
     return owner;
 }
 

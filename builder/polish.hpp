@@ -27,14 +27,13 @@ struct PolishOptions {
     std::function<void(double)> progress = {};
 };
 
-/// Cuts the pieces that no ellipsoid (with its chain) holds nearly or wholly, until one does or they are as small as
+/// Cuts the pieces that no ellipsoid holds nearly or wholly, until one does or they are as small as
 /// pieces get: seams between ellipsoids become fine, everything else stays coarse.
-void refine_seams(Pieces& pieces, const EllipsoidSet& set);
+void refine_seams(Pieces& pieces, std::span<const Fit> fits);
 
-/// Makes `set` cover all pieces and lowers its error. Ancestors in the chains grow a little where that spares a child
-/// much: pieces on the seams of parents. Returns each piece's owner: the ellipsoid that holds it most
-/// centrally, itself and all of its chain. Ellipsoids that the others make redundant own nothing.
-std::vector<uint32_t> polish(EllipsoidSet& set, const Pieces& pieces, const DistanceField& field,
+/// Makes `fits` cover all pieces and lowers their error. Returns each piece's owner: the ellipsoid that holds it most
+/// centrally. Ellipsoids that the others make redundant own nothing.
+std::vector<uint32_t> polish(std::vector<Fit>& fits, const Pieces& pieces, const DistanceField& field,
                              const PolishOptions& options);
 
 } // namespace prolate

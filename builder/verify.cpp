@@ -8,8 +8,9 @@
 // around each point of the solid there is a box small enough for one of them, unless that point is on the very border
 // of all ellipsoids that contain it.
 //
-// A node stands for a part of the parts of those above it. So "in a node" means: in its ellipsoid and in all of theirs,
-// which is convex, too. That a query reaches it is for the bounding volumes to see to (verify_bounding.cpp).
+// Each level is a cover by itself. That a query reaches its nodes is for the bounding volumes to see to
+// (verify_bounding.cpp). A prefix of an exact tree has none, and queries descend by its nodes: there "in a node" means
+// in its ellipsoid and in those of all nodes above it, which is convex, too.
 //
 // Rounding: clipped corners are off by a few 2^-53 of the largest coordinate; kTolerance asks for 1e-12 of it. Corners
 // of B are classified by the winding number with a threshold of 0.25: in doubt a corner belongs to the solid.
@@ -48,11 +49,11 @@ constexpr int kTaskLevels = 3;                 // 8^3 boxes to share between thr
 constexpr size_t kMostCorners = 4'000'000;     // to remember
 constexpr size_t kFewCandidates = 6;           // up to so many are tried in pairs
 
-struct Shape { // a node and, by `parent`, those above it
+struct Shape { // a node and, by `parent`, those above it that must hold the same
     Fit fit;
     double shrunk;                 // squared radial coordinate up to which a point is inside beyond doubt
     double shortest_inverse;       // bounds |L^-1 v| / |v|
-    const Shape* parent = nullptr; // of the root: none
+    const Shape* parent = nullptr; // none: it stands for itself
 
     bool ellipsoid_holds(const Vec& p) const { return fit.radial_squared(p) <= shrunk; }
     bool holds(const Vec& p) const { return ellipsoid_holds(p) && (parent == nullptr || parent->holds(p)); }
@@ -331,6 +332,7 @@ std::vector<Shape> shapes_of(const TreeView& tree, double rounding) {
         shape.shortest_inverse = shape.fit.inverse.norm();
         const double margin = std::max(0.0, 1 - rounding * shape.shortest_inverse);
         shape.shrunk = margin > 0 ? margin * margin - 1e-14 : -1;
+        if (!tree.bake_info().exact) return;
         const ChildRange children = tree.children(node);
         for (uint32_t c = 0; c < children.count; ++c) shapes[children.first + c].parent = &shape;
     });

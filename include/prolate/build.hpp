@@ -48,7 +48,7 @@ Result<void> validate(const BuildOptions& options);
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It rises whenever the same file and options give
 /// other bytes, so that no cache takes an old bake for a new one.
-inline constexpr uint32_t kBuilderVersion = 10;
+inline constexpr uint32_t kBuilderVersion = 11;
 
 /// Hash of everything except the mesh that determines the bytes: the options (without `threads`), kBuilderVersion and
 /// kFormatVersion. With hash(MeshView) of the cleaned mesh it makes the key of a cache of bakes. BakeInfo holds both.
@@ -102,8 +102,8 @@ inline constexpr double kThinnestNodeOfPlace = 0x1p-21;
 /// A mesh that is still open after clean() is baked in surface mode: its triangles are certainly covered, its inside
 /// only as far as the generalized winding number tells what is inside.
 ///
-/// With `levels`, the leaves have at most about 1.3 times the outside volume of the best set of as many `ellipsoids`
-/// (of the union's volume, if the mesh encloses nothing). Levels in between may have more volume outside than the root.
+/// With `levels`, each level is optimised by itself. The leaves have at most about 1.3 times the outside volume of the
+/// best set of as many `ellipsoids` (of the union's volume, if the mesh encloses nothing).
 ///
 /// Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});

@@ -1,8 +1,8 @@
 // The ellipsoid tree: the bytes of an .etree file, and a view that reads them in place.
 //
-// A tree of degree k is a hierarchy of ellipsoids. Level 0 is a single ellipsoid around everything; the children of a
-// node together cover the part of the solid that the node stands for. A *cut* at a level consists of the nodes of that
-// level and the leaves above it. Every cut covers the solid. A child need not lie inside its parent's ellipsoid.
+// A tree of degree k is a hierarchy of ellipsoids. Level 0 is a single ellipsoid around everything. A *cut* at a level
+// consists of its nodes and the leaves above it. Every cut covers the solid. A node's children are near it, but need
+// neither lie in it nor cover what it covers: nodes of several levels do not add up to a cover.
 //
 // An *exact* tree also holds the triangles of its mesh, a few in each leaf. Its ellipsoids cover these triangles but
 // not what they enclose. They only cull; queries answer for the triangles. These are the triangles as clean() leaves

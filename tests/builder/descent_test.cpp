@@ -57,10 +57,10 @@ DescentOptions options_for(int iterations, Primitive primitive = Primitive::elli
     return {{0.5, 0.5, 0.3}, primitive, iterations, 256, 1e-5, false, 1, 7};
 }
 
-void descend_onto(const Mesh& mesh, EllipsoidSet& set, const DescentOptions& options) {
+void descend_onto(const Mesh& mesh, std::vector<Fit>& set, const DescentOptions& options) {
     const DistanceField field(mesh.view(), true, Winding(mesh.view()), 60);
     const std::vector<Vec> points = points_of(mesh);
-    descend(set, field, points, nearest_of(set.fits, points), options);
+    descend(set, field, points, nearest_of(set, points), options);
 }
 
 CoverVolume measure(const Mesh& mesh, std::span<const Fit> fits) {
@@ -170,13 +170,13 @@ TEST(Descent, FindsTheEllipsoidThatTheSolidIs) {
         const Vec radii(1, 0.5 + 0.3 * random.uniform(), 0.3);
         const Fit solid = capped(random_vec(random), turn * radii.cwiseAbs2().asDiagonal() * turn.transpose(), 1e-6);
         const Mesh mesh = mesh_of(solid);
-        EllipsoidSet set{{ball(solid.center + 0.3 * random_vec(random), 0.5)}, {}, {}};
+        std::vector<Fit> set{ball(solid.center + 0.3 * random_vec(random), 0.5)};
         descend_onto(mesh, set, options_for(200));
-        const CoverVolume volume = measure(mesh, set.fits);
+        const CoverVolume volume = measure(mesh, set);
         EXPECT_LT(volume.outside.value, 0.03 * volume.solid.value);
         EXPECT_LT(uncovered(volume), 5e-3 * volume.solid.value);
-        EXPECT_LT((set.fits[0].center - solid.center).norm(), 0.01);
-        const Mat difference = solid.inverse * set.fits[0].factor;
+        EXPECT_LT((set[0].center - solid.center).norm(), 0.01);
+        const Mat difference = solid.inverse * set[0].factor;
         EXPECT_LT((difference * difference.transpose() - Mat::Identity()).norm(), 0.05);
     }
 }
@@ -188,35 +188,35 @@ TEST(Descent, SharesTwoBallsBetweenTwoEllipsoids) {
         // From too large and in between, and from inside.
         for (const auto& start : {std::pair(ball({0.3, 0.2, 0}, 0.8), ball({1, 0.3, 0.1}, 0.6)),
                                   std::pair(ball({0.1, 0.1, 0}, 0.1), ball({1.4, 0.5, 0}, 0.1))}) {
-            EllipsoidSet set{{start.first, start.second}, {}, {}};
+            std::vector<Fit> set{start.first, start.second};
             descend_onto(mesh, set, options_for(200, primitive));
-            const CoverVolume volume = measure(mesh, set.fits);
+            const CoverVolume volume = measure(mesh, set);
             EXPECT_LT(volume.outside.value, 0.04 * volume.solid.value);
             EXPECT_LT(uncovered(volume), 5e-3 * volume.solid.value);
-            EXPECT_LT((set.fits[0].center - Vec(0, 0, 0)).norm(), 0.02);
-            EXPECT_LT((set.fits[1].center - Vec(1.5, 0.5, 0)).norm(), 0.02);
+            EXPECT_LT((set[0].center - Vec(0, 0, 0)).norm(), 0.02);
+            EXPECT_LT((set[1].center - Vec(1.5, 0.5, 0)).norm(), 0.02);
         }
     }
 }
 
 // Ellipsoids around a ring.
-EllipsoidSet around_a_torus(int count) {
-    EllipsoidSet set;
+std::vector<Fit> around_a_torus(int count) {
+    std::vector<Fit> set;
     for (int i = 0; i < count; ++i) {
         const double angle = 2 * std::numbers::pi * i / count;
-        set.fits.push_back(ball({std::cos(angle), std::sin(angle), 0}, 0.35 + 0.01 * (i % 3)));
+        set.push_back(ball({std::cos(angle), std::sin(angle), 0}, 0.35 + 0.01 * (i % 3)));
     }
     return set;
 }
 
 TEST(Descent, NearlyCoversAndGetsTighter) {
     const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
-    EllipsoidSet set = around_a_torus(8);
+    std::vector<Fit> set = around_a_torus(8);
     descend_onto(mesh, set, options_for(150));
-    const CoverVolume volume = measure(mesh, set.fits);
+    const CoverVolume volume = measure(mesh, set);
     EXPECT_LT(volume.outside.value, 0.2 * volume.solid.value);
     EXPECT_LT(uncovered(volume), 0.01 * volume.solid.value);
-    for (const Fit& fit : set.fits) EXPECT_TRUE(within_caps(fit, 1e-5));
+    for (const Fit& fit : set) EXPECT_TRUE(within_caps(fit, 1e-5));
 }
 
 TEST(Descent, LetsIdleEllipsoidsHelpElsewhere) {
@@ -224,16 +224,16 @@ TEST(Descent, LetsIdleEllipsoidsHelpElsewhere) {
     Mesh mesh = mesh_of(ball({0, 0, 0}, 0.5), 3);
     shapes::append(mesh, mesh_of(ball({2, 0, 0}, 0.5), 3));
     shapes::append(mesh, mesh_of(ball({4, 0, 0}, 0.5), 3));
-    EllipsoidSet start;
-    for (int i = 0; i < 5; ++i) start.fits.push_back(ball({0.05 * i, 0.05 * i, 0}, 0.45));
-    start.fits.push_back(ball({3, 0, 0}, 1.6));
+    std::vector<Fit> start;
+    for (int i = 0; i < 5; ++i) start.push_back(ball({0.05 * i, 0.05 * i, 0}, 0.45));
+    start.push_back(ball({3, 0, 0}, 1.6));
     double outside[2];
     for (const bool relocate : {false, true}) {
-        EllipsoidSet set = start;
+        std::vector<Fit> set = start;
         DescentOptions options = options_for(200);
         options.relocate = relocate;
         descend_onto(mesh, set, options);
-        const CoverVolume volume = measure(mesh, set.fits);
+        const CoverVolume volume = measure(mesh, set);
         outside[relocate] = volume.outside.value / volume.solid.value;
         EXPECT_LT(uncovered(volume), 0.02 * volume.solid.value);
     }
@@ -242,66 +242,26 @@ TEST(Descent, LetsIdleEllipsoidsHelpElsewhere) {
 }
 
 TEST(Descent, SpheresStaySpheres) {
-    EllipsoidSet set = around_a_torus(12);
+    std::vector<Fit> set = around_a_torus(12);
     DescentOptions options = options_for(60, Primitive::sphere);
     options.relocate = true;
     descend_onto(shapes::torus(1, 0.3f, 40, 20), set, options);
-    for (const Fit& fit : set.fits) EXPECT_EQ(fit.factor, fit.factor(0, 0) * Mat::Identity());
+    for (const Fit& fit : set) EXPECT_EQ(fit.factor, fit.factor(0, 0) * Mat::Identity());
 }
 
 TEST(Descent, IsTheSameForAnyNumberOfThreads) {
     const Mesh mesh = shapes::torus(1, 0.3f, 40, 20);
-    EllipsoidSet sets[2] = {around_a_torus(30), around_a_torus(30)};
+    std::vector<Fit> sets[2] = {around_a_torus(30), around_a_torus(30)};
     for (const size_t run : {0u, 1u})
         tbb::task_arena(run == 0 ? 1 : 4).execute([&] {
             DescentOptions options = options_for(40);
             options.relocate = true;
             descend_onto(mesh, sets[run], options);
         });
-    for (size_t i = 0; i < sets[0].fits.size(); ++i) {
-        EXPECT_EQ(sets[0].fits[i].center, sets[1].fits[i].center);
-        EXPECT_EQ(sets[0].fits[i].factor, sets[1].fits[i].factor);
+    for (size_t i = 0; i < sets[0].size(); ++i) {
+        EXPECT_EQ(sets[0][i].center, sets[1][i].center);
+        EXPECT_EQ(sets[0][i].factor, sets[1][i].factor);
     }
-}
-
-TEST(Descent, AChildDoesNotCountBeyondItsParents) {
-    // A bar whose halves two parents have, with some overlap. The first child starts around all of the bar, the second
-    // one tiny at the right end, where the first one covers - but its parent does not.
-    const Mesh bar = mesh_of(Fit(Vec::Zero(), Vec(2, 0.3, 0.3).asDiagonal().toDenseMatrix()));
-    const std::vector<Fit> start{Fit(Vec::Zero(), Vec(2.02, 0.31, 0.31).asDiagonal().toDenseMatrix()),
-                                 ball({1.7, 0, 0}, 0.1)};
-    const auto half = [](double x) { return Fit({x, 0, 0}, Vec(1.6, 1, 1).asDiagonal().toDenseMatrix()); };
-    EllipsoidSet set{start, {0, 1}, {{half(-1.2)}, {half(1.2)}}};
-    descend_onto(bar, set, options_for(250));
-    for (const Vec& p : points_of(bar)) {
-        double nearest = HUGE_VAL;
-        for (size_t i = 0; i < 2; ++i)
-            if (set.chain(i)[0].radial_squared(p) <= 1) nearest = std::min(nearest, set.fits[i].radial_squared(p));
-        EXPECT_LT(nearest, 1.1) << p.transpose();
-    }
-    EXPECT_LT(set.fits[1].center.x() - set.fits[1].half_extents().x(), 0.45); // where the left parent ends
-    // Without parents nothing makes it grow.
-    EllipsoidSet free{start, {}, {}};
-    descend_onto(bar, free, options_for(250));
-    EXPECT_LT(free.fits[1].half_extents().x(), 0.2);
-}
-
-TEST(Descent, PointsWantAnEllipsoidThatMayHaveThem) {
-    // As above, with a sheet, and nothing else that counts: only points pull, and all of them begin in the first child.
-    const Mesh sheet = shapes::moved(shapes::sheet(4, 0.4f, 20), {-2, -0.2f, 0});
-    const auto half = [](double x) { return Fit({x, 0, 0}, Vec(1.6, 1, 1).asDiagonal().toDenseMatrix()); };
-    EllipsoidSet set{{Fit(Vec::Zero(), Vec(2.2, 0.5, 0.1).asDiagonal().toDenseMatrix()), ball({1.7, 0, 0}, 0.1)},
-                     {0, 1},
-                     {{half(-1.2)}, {half(1.2)}}};
-    const DistanceField field(sheet.view(), false, Winding(sheet.view()), 60);
-    const std::vector<Vec> points = points_of(sheet);
-    DescentOptions options = options_for(250);
-    options.objective = {0, 0, 1};
-    descend(set, field, points, std::vector<uint32_t>(points.size(), 0), options);
-    for (const Vec& p : points)
-        if (p.x() > 0.5) {
-            EXPECT_LT(set.fits[1].radial_squared(p), 1.2) << p.transpose();
-        }
 }
 
 } // namespace

@@ -142,12 +142,12 @@ TEST(SampledOutsideVolume, IsTheEllipsoidsVolumeOutsideTheSolid) {
 
 // --- polish ---------------------------------------------------------------------------------------------------------
 
-EllipsoidSet spread(const Scene& scene, uint32_t k, Primitive primitive, double scale = 1) {
-    EllipsoidSet set;
+std::vector<Fit> spread(const Scene& scene, uint32_t k, Primitive primitive, double scale = 1) {
+    std::vector<Fit> set;
     for (const Cluster& cluster : spread_start(scene.cells, scene.all_cells(), k, 3, kMinRadius)) {
         const Fit fit =
             capped(cluster.fit.center, scale * scale * cluster.fit.factor * cluster.fit.factor.transpose(), kMinRadius);
-        set.fits.push_back(as_primitive(fit, primitive));
+        set.push_back(as_primitive(fit, primitive));
     }
     return set;
 }
@@ -163,29 +163,28 @@ PolishOptions options_for(const Scene& scene, Primitive primitive, int sweeps = 
             1};
 }
 
-void expect_cover(const EllipsoidSet& set, const Pieces& pieces, const std::vector<uint32_t>& owner) {
+void expect_cover(const std::vector<Fit>& set, const Pieces& pieces, const std::vector<uint32_t>& owner) {
     constexpr double kHeld = 1 + 1e-6;
     ASSERT_EQ(owner.size(), pieces.size());
     for (uint32_t piece = 0; piece < pieces.size(); ++piece) {
-        ASSERT_LT(owner[piece], set.fits.size());
-        EXPECT_LE(set.fits[owner[piece]].reach(pieces.points(piece)), kHeld);
-        for (const Fit& ancestor : set.chain(owner[piece])) EXPECT_LE(ancestor.reach(pieces.points(piece)), kHeld);
+        ASSERT_LT(owner[piece], set.size());
+        EXPECT_LE(set[owner[piece]].reach(pieces.points(piece)), kHeld);
     }
 }
 
 // The start, each ellipsoid enlarged until it has the pieces that it is nearest to.
-std::vector<Fit> inflated(const EllipsoidSet& set, const Pieces& pieces) {
-    std::vector<double> reach(set.fits.size(), 0);
+std::vector<Fit> inflated(const std::vector<Fit>& set, const Pieces& pieces) {
+    std::vector<double> reach(set.size(), 0);
     for (uint32_t piece = 0; piece < pieces.size(); ++piece) {
         size_t nearest = 0;
         double least = HUGE_VAL;
-        for (size_t i = 0; i < set.fits.size(); ++i)
-            if (const double r = set.fits[i].reach(pieces.points(piece)); r < least) least = r, nearest = i;
+        for (size_t i = 0; i < set.size(); ++i)
+            if (const double r = set[i].reach(pieces.points(piece)); r < least) least = r, nearest = i;
         reach[nearest] = std::max(reach[nearest], least);
     }
     std::vector<Fit> out;
-    for (size_t i = 0; i < set.fits.size(); ++i)
-        if (reach[i] > 0) out.push_back(set.fits[i].scaled(reach[i]));
+    for (size_t i = 0; i < set.size(); ++i)
+        if (reach[i] > 0) out.push_back(set[i].scaled(reach[i]));
     return out;
 }
 
@@ -227,12 +226,12 @@ TEST(Polish, CoversAllPiecesWithLessThanTheInflatedStart) {
     for (const auto& scene : scenes())
         for (const Primitive primitive : {Primitive::ellipsoid, Primitive::sphere})
             for (const uint32_t k : {1u, 2u, 9u, 40u}) {
-                EllipsoidSet set = spread(*scene, k, primitive);
+                std::vector<Fit> set = spread(*scene, k, primitive);
                 const double before = scene->outside(inflated(set, scene->pieces));
                 const auto owner = polish(set, scene->pieces, scene->field, options_for(*scene, primitive));
                 expect_cover(set, scene->pieces, owner);
-                EXPECT_LE(scene->outside(set.fits), before * (1 + 1e-6)) << k;
-                for (const Fit& fit : set.fits) {
+                EXPECT_LE(scene->outside(set), before * (1 + 1e-6)) << k;
+                for (const Fit& fit : set) {
                     EXPECT_TRUE(within_caps(fit, kMinRadius, kMaxAxisRatio));
                     if (primitive == Primitive::sphere) {
                         EXPECT_EQ(fit.factor, fit.factor(0, 0) * Mat::Identity());
@@ -245,13 +244,13 @@ TEST(Polish, CoversFromTheWorstOfStarts) {
     for (const auto& scene : scenes()) {
         // Much too small, much too large, and all in one corner.
         for (const double scale : {0.1, 3.0}) {
-            EllipsoidSet set = spread(*scene, 12, Primitive::ellipsoid, scale);
+            std::vector<Fit> set = spread(*scene, 12, Primitive::ellipsoid, scale);
             expect_cover(set, scene->pieces,
                          polish(set, scene->pieces, scene->field, options_for(*scene, Primitive::ellipsoid)));
         }
-        EllipsoidSet set;
+        std::vector<Fit> set;
         const Vec corner = to_vec(scene->mesh.vertices[0]);
-        for (int i = 0; i < 6; ++i) set.fits.emplace_back(corner + 0.01 * i * Vec::Ones(), 0.02 * Mat::Identity());
+        for (int i = 0; i < 6; ++i) set.emplace_back(corner + 0.01 * i * Vec::Ones(), 0.02 * Mat::Identity());
         expect_cover(set, scene->pieces,
                      polish(set, scene->pieces, scene->field, options_for(*scene, Primitive::ellipsoid)));
     }
@@ -259,40 +258,35 @@ TEST(Polish, CoversFromTheWorstOfStarts) {
 
 TEST(Polish, FindsTheBallThatTheSolidIs) {
     const Scene scene(shapes::icosphere(4));
-    EllipsoidSet set{{Fit(Vec(0.02, 0, 0), Vec(1.08, 1, 1.04).asDiagonal().toDenseMatrix())}, {}, {}};
+    std::vector<Fit> set{Fit(Vec(0.02, 0, 0), Vec(1.08, 1, 1.04).asDiagonal().toDenseMatrix())};
     const auto owner = polish(set, scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid, 40));
     expect_cover(set, scene.pieces, owner);
-    EXPECT_LT(set.fits[0].volume(), 1.02 * Fit().volume());
+    EXPECT_LT(set[0].volume(), 1.02 * Fit().volume());
 }
 
 TEST(Polish, IsTheSameForAnyNumberOfThreads) {
     const Scene scene(shapes::torus(1, 0.3f, 40, 20));
-    EllipsoidSet sets[2] = {spread(scene, 30, Primitive::ellipsoid), spread(scene, 30, Primitive::ellipsoid)};
+    std::vector<Fit> sets[2] = {spread(scene, 30, Primitive::ellipsoid), spread(scene, 30, Primitive::ellipsoid)};
     std::vector<uint32_t> owners[2];
     for (const size_t run : {0u, 1u})
         tbb::task_arena(run == 0 ? 1 : 4).execute([&] {
             owners[run] = polish(sets[run], scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid));
         });
     EXPECT_EQ(owners[0], owners[1]);
-    for (size_t i = 0; i < sets[0].fits.size(); ++i) {
-        EXPECT_EQ(sets[0].fits[i].center, sets[1].fits[i].center);
-        EXPECT_EQ(sets[0].fits[i].factor, sets[1].fits[i].factor);
+    for (size_t i = 0; i < sets[0].size(); ++i) {
+        EXPECT_EQ(sets[0][i].center, sets[1][i].center);
+        EXPECT_EQ(sets[0][i].factor, sets[1][i].factor);
     }
 }
 
-// Is the piece in an ellipsoid of this scale, and in that one's chain?
-bool held(const EllipsoidSet& set, const Pieces& pieces, uint32_t piece, double scale) {
-    for (size_t i = 0; i < set.fits.size(); ++i) {
-        bool all = set.fits[i].reach(pieces.points(piece)) <= scale;
-        for (const Fit& ancestor : set.chain(i)) all = all && ancestor.reach(pieces.points(piece)) <= 1 + 1e-6;
-        if (all) return true;
-    }
-    return false;
+// Is the piece in an ellipsoid of this scale?
+bool held(const std::vector<Fit>& set, const Pieces& pieces, uint32_t piece, double scale) {
+    return std::ranges::any_of(set, [&](const Fit& fit) { return fit.reach(pieces.points(piece)) <= scale; });
 }
 
 TEST(RefineSeams, CutsWhatNobodyHoldsAndNothingElse) {
     Scene scene(shapes::torus(1, 0.3f, 40, 20));
-    const EllipsoidSet set = spread(scene, 20, Primitive::ellipsoid, 1.1);
+    const std::vector<Fit> set = spread(scene, 20, Primitive::ellipsoid, 1.1);
     const uint32_t count = scene.pieces.size();
     std::vector<std::vector<Vec>> before;
     for (uint32_t piece = 0; piece < count; ++piece)
@@ -309,32 +303,6 @@ TEST(RefineSeams, CutsWhatNobodyHoldsAndNothingElse) {
         if (!held(set, scene.pieces, piece, 1.01)) {
             EXPECT_FALSE(scene.pieces.refine(piece));
         }
-}
-
-// Children of two parents that overlap: each piece must end in a child whose parent has it, also after cuts.
-TEST(Polish, KeepsToTheChains) {
-    for (const bool closed : {true, false}) {
-        Mesh mesh = shapes::torus(1, 0.3f, 40, 20);
-        if (!closed) // gashes: the inside fades there
-            std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] % 20 < 3 || t[0] % 160 < 40; });
-        Scene scene(mesh, closed);
-        EllipsoidSet parents = spread(scene, 4, Primitive::ellipsoid);
-        refine_seams(scene.pieces, parents);
-        const auto first = polish(parents, scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid));
-        expect_cover(parents, scene.pieces, first);
-        EllipsoidSet children;
-        for (uint32_t p = 0; p < parents.fits.size(); ++p) {
-            children.chains.push_back({parents.fits[p]});
-            for (int i = 0; i < 3; ++i) {
-                const double angle = std::atan2(parents.fits[p].center.y(), parents.fits[p].center.x()) + 0.4 * (i - 1);
-                children.fits.emplace_back(Vec(std::cos(angle), std::sin(angle), 0), 0.25 * Mat::Identity());
-                children.parent.push_back(p);
-            }
-        }
-        refine_seams(scene.pieces, children);
-        const auto owner = polish(children, scene.pieces, scene.field, options_for(scene, Primitive::ellipsoid));
-        expect_cover(children, scene.pieces, owner);
-    }
 }
 
 } // namespace

@@ -1,0 +1,263 @@
+#include "builder/flat_set.hpp"
+
+#include "builder/central.hpp"
+#include "builder/divide.hpp"
+#include "builder/job.hpp"
+#include "builder/random.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace prolate {
+namespace {
+
+// Merging starts cost more than they give for sets of more ellipsoids than this.
+constexpr uint32_t kMergeLimit = 64;
+// Up to so many ellipsoids they are the first choice.
+constexpr uint32_t kFew = 16;
+// Sets of fewer ellipsoids than kManyStarts have more starts than usual, up to kMostStarts times as many: they cost
+// little, and more depends on where they start.
+constexpr uint32_t kManyStarts = 64;
+constexpr int kMostStarts = 4;
+constexpr uint32_t kPiecesPerCluster[] = {16, 32, 8, 24, 12}; // of the merging starts, in turn
+constexpr double kUncoveredWeight = 50;                       // per volume outside, when descents are compared
+// Objective::scale of solids: in sides of a cube that has an ellipsoid's share of the volume.
+constexpr double kShapeScale = 0.35;
+// Of thin ones, and of surfaces that enclose nothing: in sides of a square that has its share of the area.
+constexpr double kThinShapeScale = 0.1;
+constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
+constexpr int kPolishDirections = 256;
+// A set whose ellipsoids start below those of the set above may have so much more error than one that starts alone.
+constexpr double kMostLoss = 1.15;
+constexpr double kReheat = 10;      // kappa at the start of a cycle
+constexpr double kLeastWorth = 0.5; // of a further ellipsoid, in means of those that are there
+
+} // namespace
+
+std::vector<Fit> fits_of(std::span<const Part> parts) {
+    std::vector<Fit> out;
+    out.reserve(parts.size());
+    for (const Part& part : parts) out.push_back(part.fit);
+    return out;
+}
+
+std::vector<Ellipsoid> ellipsoids_of(std::span<const Fit> fits) {
+    std::vector<Ellipsoid> out;
+    out.reserve(fits.size());
+    for (const Fit& fit : fits) out.push_back(fit.ellipsoid());
+    return out;
+}
+
+void follow_cuts(FlatSet& set, const Pieces& pieces) {
+    std::vector<uint32_t> owner(pieces.size());
+    for (uint32_t n = 0; n < set.parts.size(); ++n)
+        for (const uint32_t piece : set.parts[n].pieces) owner[piece] = n;
+    for (; set.piece_count < pieces.size(); ++set.piece_count) {
+        const uint32_t piece = set.piece_count;
+        owner[piece] = owner[pieces.cut_from(piece)];
+        set.parts[owner[piece]].pieces.push_back(piece);
+    }
+}
+
+FlatSetMaker::FlatSetMaker(const Solid& solid, const BuildOptions& options, const Effort& effort, double min_radius)
+    : solid_(solid), options_(options), effort_(effort), min_radius_(min_radius),
+      solid_volume_(solid.columns.volume().value) {
+    for (uint32_t piece = 0; piece < solid.pieces.size(); ++piece)
+        solid.pieces.for_each_surface_point(piece, [this](const Vec& p) { surface_.push_back(p); });
+}
+
+FlatSet FlatSetMaker::single() const {
+    std::vector<uint32_t> all(solid_.pieces.size());
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<Fit> fits{fit_pieces(solid_.pieces, all, min_radius_)};
+    if (options_.primitive == Primitive::sphere) {
+        fits[0] = as_primitive(fits[0], Primitive::sphere);
+        polish_set(fits);
+    }
+    return {{{fits[0], std::move(all)}}, outside_of(fits), solid_.pieces.size()};
+}
+
+FlatSet FlatSetMaker::make(uint32_t count, const FlatSet* above, const std::function<void(double)>& progress) {
+    return settle(approach(count, above, progress), count);
+}
+
+// A set that all but covers: the best one that the descents found.
+std::vector<Fit> FlatSetMaker::approach(uint32_t count, const FlatSet* above,
+                                        const std::function<void(double)>& progress) const {
+    int starts = effort_.starts * std::clamp(static_cast<int>(kManyStarts / count), 1, kMostStarts);
+    if (above && above->parts.size() == 1) above = nullptr;
+    if (above) starts = std::max(starts, 2); // the last one knows of no set above
+    const int rounds = starts + effort_.cycles;
+    const std::vector<Vec> points = points_for(count);
+    Start best;
+    double least = HUGE_VAL; // error
+    for (int round = 0; round < rounds; ++round) {
+        const bool fresh = round < starts, alone = round == starts - 1;
+        Start now = fresh ? start(count, alone ? nullptr : above, round, points) : best;
+        descend_from(now, points, fresh ? effort_.iterations : effort_.iterations / 2, fresh ? 1 : kReheat, round,
+                     [&](double done) { progress(0.9 * (round + done) / rounds); });
+        double error = approximate_error(now.fits);
+        if (above && now.family.empty()) error *= kMostLoss;
+        if (!(error < least || best.fits.empty())) continue;
+        best = std::move(now), least = error;
+    }
+    return best.fits;
+}
+
+FlatSet FlatSetMaker::settle(std::vector<Fit> fits, size_t count) {
+    refine_seams(solid_.pieces, fits);
+    const std::vector<uint32_t> owner = polish_set(fits);
+    FlatSet set;
+    set.piece_count = solid_.pieces.size();
+    for (const Fit& fit : fits) set.parts.push_back({fit, {}});
+    for (uint32_t piece = 0; piece < owner.size(); ++piece) set.parts[owner[piece]].pieces.push_back(piece);
+    std::erase_if(set.parts, [](const Part& part) { return part.pieces.empty(); });
+    set.outside = outside_of(fits_of(set.parts));
+    // Places of those that were redundant go to halves, where one more is worth about as much as the others.
+    FlatSet fuller = set;
+    halve(fuller.parts, count, kLeastWorth * set.outside / static_cast<double>(set.parts.size()));
+    if (fuller.parts.size() == set.parts.size()) return set;
+    fuller.outside = outside_of(fits_of(fuller.parts));
+    return fuller.outside < set.outside ? fuller : set;
+}
+
+void FlatSetMaker::split(FlatSet& set, size_t count) const {
+    if (set.parts.size() >= count) return;
+    halve(set.parts, count, -HUGE_VAL);
+    set.outside = outside_of(fits_of(set.parts));
+}
+
+// Halves the part that sticks out most, and then the next, until there are `count`: only such as then stick out by at
+// least `worth` cubic metres less.
+void FlatSetMaker::halve(std::vector<Part>& parts, size_t count, double worth) const {
+    if (parts.size() >= count) return;
+    std::vector<double> outside;
+    const auto look = [&](const Part& part) { return part.pieces.size() > 1 ? outside_volume(part.fit) : -1; };
+    outside.reserve(parts.size());
+    for (const Part& part : parts) outside.push_back(look(part));
+    while (parts.size() < count) {
+        const auto most = static_cast<size_t>(std::ranges::max_element(outside) - outside.begin());
+        if (outside.empty() || outside[most] < 0) return;
+        const Part whole = parts[most];
+        const auto [a, b] = divide(whole.pieces, whole.pieces.size() / 2,
+                                   [this](uint32_t piece) { return solid_.pieces.center(piece); });
+        Part low{part_of(whole.fit, a), a}, high{part_of(whole.fit, b), b};
+        if (outside_volume(low.fit) + outside_volume(high.fit) + worth > outside[most]) {
+            outside[most] = -1;
+            continue;
+        }
+        outside[most] = look(low), outside.push_back(look(high));
+        parts[most] = std::move(low), parts.push_back(std::move(high));
+    }
+}
+
+// For some of the pieces that `whole` holds: a fit of their own, or, if that sticks out more, a smaller `whole`.
+Fit FlatSetMaker::part_of(const Fit& whole, std::span<const uint32_t> pieces) const {
+    const Fit smaller = whole.scaled(reach_of(whole, solid_.pieces, pieces)), own = fit_around(pieces);
+    return within_caps(smaller, min_radius_) && outside_volume(smaller) < outside_volume(own) ? smaller : own;
+}
+
+Fit FlatSetMaker::fit_around(std::span<const uint32_t> pieces) const {
+    const Fit fit = as_primitive(fit_pieces(solid_.pieces, pieces, min_radius_), options_.primitive);
+    return fit.scaled(reach_of(fit, solid_.pieces, pieces));
+}
+
+double FlatSetMaker::outside_volume(const Fit& fit) const {
+    return solid_.outside ? solid_.outside(fit).volume : sampled_outside_volume(fit, solid_.field);
+}
+CoverVolume FlatSetMaker::measure(std::span<const Fit> fits) const {
+    return measure_cover(solid_.columns, ellipsoids_of(fits));
+}
+double FlatSetMaker::outside_of(std::span<const Fit> fits) const {
+    return measure(fits).outside.value;
+}
+double FlatSetMaker::approximate_error(std::span<const Fit> fits) const {
+    const CoverVolume volume = measure(fits);
+    const double uncovered = volume.solid.value - (volume.whole.value - volume.outside.value);
+    return volume.outside.value + kUncoveredWeight * uncovered;
+}
+
+FlatSetMaker::Start FlatSetMaker::start(uint32_t count, const FlatSet* above, int number,
+                                        std::span<const Vec> points) const {
+    const bool merging = count <= kMergeLimit && (number % 2 == 0) == (count <= kFew);
+    const uint32_t blocks = kPiecesPerCluster[static_cast<size_t>(number) / 2 % std::size(kPiecesPerCluster)];
+    const auto seed = options_.seed + static_cast<uint64_t>(number);
+    const std::vector<std::vector<uint32_t>> shares = share_cells(above);
+    std::vector<std::vector<Cluster>> clusters(shares.size());
+    parallel_for(size_t{0}, shares.size(), [&](size_t s) {
+        const auto k = static_cast<uint32_t>(count * (s + 1) / shares.size() - count * s / shares.size());
+        clusters[s] = merging ? merge_start(solid_.cells, shares[s], k, blocks, min_radius_,
+                                            [this](const Fit& fit) { return outside_volume(fit); })
+                              : spread_start(solid_.cells, shares[s], k, seed, min_radius_);
+    });
+    Start out;
+    std::vector<uint32_t> of_cell(solid_.cells.cell_count(), 0);
+    for (uint32_t share = 0; share < shares.size(); ++share)
+        for (const Cluster& cluster : clusters[share]) {
+            for (const uint32_t cell : cluster.cells) of_cell[cell] = static_cast<uint32_t>(out.fits.size());
+            out.fits.push_back(as_primitive(cluster.fit, options_.primitive));
+            if (above) out.family.push_back(share);
+        }
+    for (const Vec& p : points) {
+        const uint32_t cell = solid_.cells.cell_at(p);
+        out.owner.push_back(cell == Voxels::kNoCell ? 0 : of_cell[cell]);
+    }
+    return out;
+}
+
+// The cells, each to the part of `above` that has it most centrally.
+std::vector<std::vector<uint32_t>> FlatSetMaker::share_cells(const FlatSet* above) const {
+    const std::vector<Fit> fits = above ? fits_of(above->parts) : std::vector<Fit>(1);
+    const CentralTree tree(fits);
+    std::vector<std::vector<uint32_t>> out(fits.size());
+    for (uint32_t cell = 0; cell < solid_.cells.cell_count(); ++cell)
+        out[tree.find(solid_.cells.box(cell).center(), HUGE_VAL).value_or(0)].push_back(cell);
+    return out;
+}
+
+// What descents look at.
+std::vector<Vec> FlatSetMaker::points_for(uint32_t count) const {
+    const auto wanted = static_cast<size_t>(std::max(kLeastPoints, kPointsPerEllipsoid * count));
+    const size_t stride = std::max<size_t>(1, surface_.size() / wanted);
+    std::vector<Vec> points;
+    for (size_t at = 0; at < surface_.size(); at += stride) points.push_back(surface_[at]);
+    return points;
+}
+
+Objective FlatSetMaker::objective(size_t count) const {
+    const double n = static_cast<double>(count), by_volume = kShapeScale * std::cbrt(solid_volume_ / n),
+                 by_area = kThinShapeScale * std::sqrt(solid_.area / n);
+    return {double{options_.alpha}, double{options_.beta}, std::max(by_volume, by_area)};
+}
+
+void FlatSetMaker::descend_from(Start& start, std::span<const Vec> points, int iterations, double kappa, int number,
+                                const std::function<void(double)>& progress) const {
+    const size_t count = start.fits.size();
+    const double directions = 800 / std::sqrt(static_cast<double>(count));
+    const DescentOptions options{.objective = objective(count),
+                                 .primitive = options_.primitive,
+                                 .iterations = iterations,
+                                 .directions = static_cast<int>(std::clamp(directions, 96.0, 384.0)),
+                                 .min_radius = min_radius_,
+                                 .relocate = count > kFew,
+                                 .first_kappa = kappa,
+                                 .seed = Random(options_.seed + static_cast<uint64_t>(number)).bits(),
+                                 .family = start.family,
+                                 .progress = progress};
+    descend(start.fits, solid_.field, points, start.owner, options);
+}
+
+std::vector<uint32_t> FlatSetMaker::polish_set(std::vector<Fit>& fits) const {
+    const PolishOptions options{.objective = objective(fits.size()),
+                                .primitive = options_.primitive,
+                                .sweeps = effort_.sweeps,
+                                .directions = kPolishDirections,
+                                .min_radius = min_radius_,
+                                .outside = solid_.outside,
+                                .error = [this](std::span<const Fit> some) { return outside_of(some); },
+                                .seed = options_.seed};
+    return polish(fits, solid_.pieces, solid_.field, options);
+}
+
+} // namespace prolate
