@@ -40,16 +40,18 @@ struct VerifyOptions {
     std::function<bool(double)> progress;
 };
 
-/// Proves each level of `tree` by adaptive subdivision of space: a cell is done when all of the solid in it (triangles
-/// clipped to the cell, and its corners inside the solid) lies in one node of the *decoded* tree, because then, an
-/// ellipsoid being convex, everything in between does. Levels are proved one by one, as each is a cover by itself; the
-/// bounding volumes, by which queries get there, are proved to hold all ellipsoids below. The mesh is given as it was
-/// read: it is welded as when the tree was baked, and where that moves points, they are proved where they stood. A point
-/// of the solid in no node ends the proof as a counterexample; a cell that cannot be decided at 1e-9 of the mesh's size
-/// ends it as "not proved". Of an exact tree, the triangles are compared with the mesh's, and each is looked for in
-/// every ellipsoid above it. A prefix of one is proved to cover the triangles, as in surface mode: there, as queries
-/// descend by its nodes, to lie in a node is to lie in all nodes above it, too. Thread-safe. Fails with bad_mesh or
-/// cancelled.
+/// Proves that each level of `tree` covers, by adaptive subdivision of space. A cell is done when the part of the solid
+/// in it (triangles clipped to the cell, and corners of the cell inside the solid) lies in one node of the *decoded*
+/// tree; since an ellipsoid is convex, everything in between does, too. Levels are proved one by one, because each is a
+/// cover by itself. The bounding volumes, by which queries cull, are proved to hold all ellipsoids below.
+///
+/// The mesh is given as it was read. It is welded as when the tree was baked, and points that this moves are proved
+/// where they were. A point of the solid in no node ends the proof as a counterexample; a cell that cannot be decided
+/// at 1e-9 of the mesh's size ends it as "not proved".
+///
+/// Of an exact tree, the triangles are compared with the mesh's, and each must lie in all ellipsoids above it. A prefix
+/// of one is proved to cover the triangles, as in surface mode. Queries descend by its nodes, so there each part must
+/// lie in a node and in all nodes above it. Thread-safe. Fails with bad_mesh or cancelled.
 Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options = {});
 
 } // namespace prolate
