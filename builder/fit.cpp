@@ -68,6 +68,104 @@ Whitened whitened(std::span<const Vec> points, double min_radius) {
     return out;
 }
 
+// Khachiyan's algorithm with away steps: weights of the points whose moments are those of the minimum-volume ellipsoid.
+class Khachiyan {
+public:
+    explicit Khachiyan(std::span<const Vec> points)
+        : lifted_(points.size()), weight_(points.size(), 0), kappa_(points.size()) {
+        for (size_t i = 0; i < points.size(); ++i) lifted_[i] << points[i], 1;
+        // From extreme points along a few directions (Kumar and Yildirim 2005): the weights stay sparse.
+        for (const Vec& d : sketch_directions().first(8)) {
+            size_t low = 0, high = 0;
+            for (size_t i = 1; i < points.size(); ++i) {
+                if (d.dot(points[i]) < d.dot(points[low])) low = i;
+                if (d.dot(points[i]) > d.dot(points[high])) high = i;
+            }
+            weight_[low] = weight_[high] = 1;
+        }
+        if (start()) return;
+        std::fill(weight_.begin(), weight_.end(), 1.0); // they lie in a plane; all of the points do not
+        start();
+    }
+
+    // The ellipsoid's center and shape matrix.
+    std::pair<Vec, Mat> run(double tolerance) {
+        for (int iteration = 0; iteration < 400; ++iteration)
+            if (!improve(tolerance)) break;
+        Vec mean = Vec::Zero();
+        for (size_t i = 0; i < lifted_.size(); ++i) mean += weight_[i] * lifted_[i].head<3>();
+        Mat q = Mat::Zero();
+        for (size_t i = 0; i < lifted_.size(); ++i) {
+            const Vec d = lifted_[i].head<3>() - mean;
+            q += 3 * weight_[i] * d * d.transpose();
+        }
+        return {mean, q};
+    }
+
+private:
+    static constexpr double kDimension = 4; // of the lifted points (x, 1)
+
+    // Equal weights for the points that have one. False if their moments are singular.
+    bool start() {
+        const auto count = std::count_if(weight_.begin(), weight_.end(), [](double w) { return w > 0; });
+        Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
+        for (size_t i = 0; i < lifted_.size(); ++i)
+            if (weight_[i] > 0) {
+                weight_[i] = 1 / static_cast<double>(count);
+                moment += weight_[i] * lifted_[i] * lifted_[i].transpose();
+            }
+        // Thin starts are legal; a trace of the identity keeps the inverse finite and dies out with the steps.
+        inverse_ = (moment + 1e-9 * Eigen::Matrix4d::Identity()).inverse();
+        double sum = 0; // of the weighted kappas: the trace of the unit matrix, unless the moments are singular
+        for (size_t i = 0; i < lifted_.size(); ++i) {
+            kappa_[i] = lifted_[i].dot(inverse_ * lifted_[i]);
+            sum += weight_[i] * kappa_[i];
+        }
+        return std::abs(sum - kDimension) < 0.1;
+    }
+
+    // One step, towards the farthest point or away from the nearest one; false if they are as good as on the border.
+    bool improve(double tolerance) {
+        const size_t n = lifted_.size();
+        size_t far = 0, near = n;
+        for (size_t i = 0; i < n; ++i) {
+            if (kappa_[i] > kappa_[far]) far = i;
+            if (weight_[i] > 0 && (near == n || kappa_[i] < kappa_[near])) near = i;
+        }
+        const double excess = kappa_[far] / kDimension - 1, slack = 1 - kappa_[near] / kDimension;
+        if (excess <= 2 * tolerance && slack <= 4 * tolerance) return false;
+        if (excess >= slack) {
+            move_to(far, (kappa_[far] - kDimension) / (kDimension * (kappa_[far] - 1)));
+            return true;
+        }
+        const double w = weight_[near], k = kappa_[near];
+        const double full = w < 1 ? w / (1 - w) : HUGE_VAL; // drops the point
+        const double best = k > 1 ? (kDimension - k) / (kDimension * (k - 1)) : HUGE_VAL;
+        move_to(near, -std::min(full, best));
+        return true;
+    }
+
+    // Weights <- (1 - beta) weights + beta e_j.
+    void move_to(size_t j, double beta) {
+        // Sherman-Morrison for ((1 - beta) M + beta q q^T)^-1.
+        const Eigen::Vector4d v = inverse_ * lifted_[j];
+        const double ratio = beta / (1 - beta), damping = ratio / (1 + ratio * kappa_[j]);
+        for (size_t i = 0; i < lifted_.size(); ++i) {
+            const double dot = lifted_[i].dot(v);
+            kappa_[i] = (kappa_[i] - damping * dot * dot) / (1 - beta);
+        }
+        inverse_ = (inverse_ - damping * v * v.transpose()) / (1 - beta);
+        for (double& w : weight_) w *= 1 - beta;
+        weight_[j] += beta;
+        if (weight_[j] < 1e-12) weight_[j] = 0;
+    }
+
+    std::vector<Eigen::Vector4d> lifted_;
+    std::vector<double> weight_;
+    std::vector<double> kappa_; // lifted^T inverse lifted: 4 on the boundary of the optimum, less inside
+    Eigen::Matrix4d inverse_;   // of the weighted points' moments
+};
+
 } // namespace
 
 Mat cholesky(const Mat& q) {
@@ -148,86 +246,7 @@ bool within_caps(const Fit& fit, double min_radius, double max_ratio) {
 
 Fit enclosing_ellipsoid(std::span<const Vec> input, double min_radius, double tolerance) {
     const auto [points, middle, axes] = whitened(input, min_radius);
-    const size_t n = points.size();
-    constexpr double kDimension = 4; // of the lifted points (x, 1)
-    std::vector<Eigen::Vector4d> lifted(n);
-    for (size_t i = 0; i < n; ++i) lifted[i] << points[i], 1;
-
-    // Start from extreme points along a few directions (Kumar and Yildirim 2005): the weights stay sparse.
-    std::vector<double> weight(n, 0);
-    size_t started = 0;
-    for (const Vec& d : sketch_directions().first(8)) {
-        size_t low = 0, high = 0;
-        for (size_t i = 1; i < n; ++i) {
-            if (d.dot(points[i]) < d.dot(points[low])) low = i;
-            if (d.dot(points[i]) > d.dot(points[high])) high = i;
-        }
-        for (const size_t i : {low, high})
-            if (weight[i] == 0) weight[i] = 1, ++started;
-    }
-    Eigen::Matrix4d inverse;
-    std::vector<double> kappa(n); // lifted^T inverse lifted: 4 on the boundary of the optimum, less inside
-    const auto start = [&] {
-        Eigen::Matrix4d moment = Eigen::Matrix4d::Zero();
-        for (size_t i = 0; i < n; ++i)
-            if (weight[i] > 0) {
-                weight[i] = 1 / static_cast<double>(started);
-                moment += weight[i] * lifted[i] * lifted[i].transpose();
-            }
-        // Thin starts are legal; a trace of the identity keeps the inverse finite and dies out with the steps.
-        inverse = (moment + 1e-9 * Eigen::Matrix4d::Identity()).inverse();
-        double sum = 0; // of the weighted kappas: the trace of the unit matrix, unless the moments are singular
-        for (size_t i = 0; i < n; ++i) {
-            kappa[i] = lifted[i].dot(inverse * lifted[i]);
-            sum += weight[i] * kappa[i];
-        }
-        return std::abs(sum - kDimension) < 0.1;
-    };
-    if (!start()) { // the extreme points lie in a plane; all of them together do not
-        std::fill(weight.begin(), weight.end(), 1.0);
-        started = n;
-        start();
-    }
-
-    for (int iteration = 0; iteration < 400; ++iteration) {
-        size_t far = 0, near = n;
-        for (size_t i = 0; i < n; ++i) {
-            if (kappa[i] > kappa[far]) far = i;
-            if (weight[i] > 0 && (near == n || kappa[i] < kappa[near])) near = i;
-        }
-        const double excess = kappa[far] / kDimension - 1, slack = 1 - kappa[near] / kDimension;
-        if (excess <= 2 * tolerance && slack <= 4 * tolerance) break;
-        size_t j;
-        double beta; // weights <- (1 - beta) weights + beta e_j
-        if (excess >= slack) {
-            j = far;
-            beta = (kappa[j] - kDimension) / (kDimension * (kappa[j] - 1));
-        } else {
-            j = near;
-            const double full = weight[j] < 1 ? weight[j] / (1 - weight[j]) : HUGE_VAL; // drops the point
-            const double best = kappa[j] > 1 ? (kDimension - kappa[j]) / (kDimension * (kappa[j] - 1)) : HUGE_VAL;
-            beta = -std::min(full, best);
-        }
-        // Sherman-Morrison for ((1 - beta) M + beta q q^T)^-1.
-        const Eigen::Vector4d v = inverse * lifted[j];
-        const double ratio = beta / (1 - beta), damping = ratio / (1 + ratio * kappa[j]);
-        for (size_t i = 0; i < n; ++i) {
-            const double dot = lifted[i].dot(v);
-            kappa[i] = (kappa[i] - damping * dot * dot) / (1 - beta);
-        }
-        inverse = (inverse - damping * v * v.transpose()) / (1 - beta);
-        for (double& w : weight) w *= 1 - beta;
-        weight[j] += beta;
-        if (weight[j] < 1e-12) weight[j] = 0;
-    }
-
-    Vec mean = Vec::Zero();
-    for (size_t i = 0; i < n; ++i) mean += weight[i] * lifted[i].head<3>();
-    Mat q = Mat::Zero();
-    for (size_t i = 0; i < n; ++i) {
-        const Vec d = lifted[i].head<3>() - mean;
-        q += 3 * weight[i] * d * d.transpose();
-    }
+    const auto [mean, q] = Khachiyan(points).run(tolerance);
     const Fit fit = capped(middle + axes * mean, axes * q * axes.transpose(), min_radius, kMaxAxisRatio);
     double reach = fit.reach(input);
     for (const Vec& p : points) reach = std::max(reach, fit.radial(middle + axes * p).norm());

@@ -1,12 +1,14 @@
 #include "builder/start.hpp"
 
-#include "builder/descent.hpp"
+#include "builder/divide.hpp"
+#include "builder/gradient_descent.hpp"
 #include "builder/job.hpp"
 #include "builder/random.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <queue>
@@ -203,6 +205,54 @@ Cluster cluster_of(const Voxels& voxels, std::vector<uint32_t> cells, double min
     return {capped(least.center, least.factor * least.factor.transpose(), min_radius), std::move(cells)};
 }
 
+// `k` of the sites, each as far from those before it as can be (Gonzalez 1985); all of them if there are fewer.
+std::vector<Vec> far_apart(std::span<const Vec> sites, uint32_t k, uint64_t seed) {
+    std::vector<Vec> out;
+    std::vector<double> distance(sites.size(), HUGE_VAL);
+    auto pick = static_cast<size_t>(Random(seed).uniform() * static_cast<double>(sites.size()));
+    while (out.size() < std::min<size_t>(k, sites.size())) {
+        out.push_back(sites[pick]);
+        for (size_t i = 0; i < sites.size(); ++i)
+            distance[i] = std::min(distance[i], (sites[i] - out.back()).squaredNorm());
+        pick = static_cast<size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
+    }
+    return out;
+}
+
+Vec mean_of(std::span<const Vec> sites, std::span<const uint32_t> members) {
+    Vec sum = Vec::Zero();
+    for (const uint32_t i : members) sum += sites[i];
+    return sum / static_cast<double>(members.size());
+}
+
+// Lloyd's algorithm: the sites that are nearest to each center.
+std::vector<std::vector<uint32_t>> lloyd(std::span<const Vec> sites, std::vector<Vec> centers) {
+    std::vector<std::vector<uint32_t>> members(centers.size());
+    for (int round = 0; round < kLloydRounds; ++round) {
+        checkpoint();
+        for (std::vector<uint32_t>& list : members) list.clear();
+        for (size_t i = 0; i < sites.size(); ++i) {
+            size_t nearest = 0;
+            double least = HUGE_VAL;
+            for (size_t c = 0; c < centers.size(); ++c)
+                if (const double d = (sites[i] - centers[c]).squaredNorm(); d < least) least = d, nearest = c;
+            members[nearest].push_back(static_cast<uint32_t>(i));
+        }
+        for (size_t c = 0; c < centers.size(); ++c)
+            if (!members[c].empty()) centers[c] = mean_of(sites, members[c]);
+    }
+    return members;
+}
+
+// The ellipsoid with the mean and covariance of these cells, were they an ellipsoid themselves, a cell thicker.
+Fit fit_of(std::span<const Vec> sites, std::span<const uint32_t> members, double pitch, double min_radius) {
+    const Vec mean = mean_of(sites, members);
+    Mat covariance = Mat::Zero();
+    for (const uint32_t i : members) covariance += (sites[i] - mean) * (sites[i] - mean).transpose();
+    covariance *= 5 / static_cast<double>(members.size());
+    return capped(mean, covariance + pitch * pitch / 4 * Mat::Identity(), min_radius);
+}
+
 } // namespace
 
 double sampled_outside_volume(const Fit& fit, const DistanceField& field) {
@@ -277,73 +327,23 @@ std::vector<std::vector<uint32_t>> merge_groups(std::span<const Sketch> sketches
 
 std::vector<Cluster> spread_start(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, uint64_t seed,
                                   double min_radius) {
-    std::vector<Vec> sites;
-    Box box;
-    for (const uint32_t cell : cells) {
-        sites.push_back(voxels.box(cell).center());
-        box.add(sites.back());
-    }
-    if (k > kDirectLimit) { // halve along the longest side
-        int axis = 0;
-        box.size().maxCoeff(&axis);
-        std::vector<uint32_t> order(cells.size());
-        std::iota(order.begin(), order.end(), 0u);
-        std::stable_sort(order.begin(), order.end(),
-                         [&](uint32_t a, uint32_t b) { return sites[a][axis] < sites[b][axis]; });
-        std::vector<uint32_t> half[2];
-        for (size_t i = 0; i < order.size(); ++i) half[i >= order.size() * (k / 2) / k].push_back(cells[order[i]]);
-        std::vector<Cluster> out;
-        for (size_t h = 0; h < 2; ++h) {
-            std::sort(half[h].begin(), half[h].end());
-            const uint32_t count = h == 0 ? k / 2 : k - k / 2;
-            for (Cluster& cluster : spread_start(voxels, half[h], count, seed + h, min_radius))
-                out.push_back(std::move(cluster));
-        }
+    if (k > kDirectLimit) {
+        std::vector<uint32_t> all(cells.begin(), cells.end());
+        auto halves = divide(std::move(all), cells.size() * (k / 2) / k,
+                             [&](uint32_t cell) { return voxels.box(cell).center(); });
+        std::sort(halves.first.begin(), halves.first.end()), std::sort(halves.second.begin(), halves.second.end());
+        std::vector<Cluster> out = spread_start(voxels, halves.first, k / 2, seed, min_radius);
+        std::ranges::move(spread_start(voxels, halves.second, k - k / 2, seed + 1, min_radius),
+                          std::back_inserter(out));
         return out;
     }
-
-    // Each center as far from those before it as can be (Gonzalez 1985), then Lloyd's algorithm.
-    Random random(seed);
-    std::vector<Vec> centers;
-    std::vector<double> distance(sites.size(), HUGE_VAL);
-    auto pick = static_cast<size_t>(random.uniform() * static_cast<double>(sites.size()));
-    while (centers.size() < std::min<size_t>(k, sites.size())) {
-        centers.push_back(sites[pick]);
-        for (size_t i = 0; i < sites.size(); ++i)
-            distance[i] = std::min(distance[i], (sites[i] - centers.back()).squaredNorm());
-        pick = static_cast<size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
-    }
-    std::vector<std::vector<uint32_t>> members(centers.size());
-    for (int round = 0; round < kLloydRounds; ++round) {
-        checkpoint();
-        for (std::vector<uint32_t>& list : members) list.clear();
-        for (size_t i = 0; i < sites.size(); ++i) {
-            size_t nearest = 0;
-            double least = HUGE_VAL;
-            for (size_t c = 0; c < centers.size(); ++c)
-                if (const double d = (sites[i] - centers[c]).squaredNorm(); d < least) least = d, nearest = c;
-            members[nearest].push_back(static_cast<uint32_t>(i));
-        }
-        for (size_t c = 0; c < centers.size(); ++c) {
-            if (members[c].empty()) continue;
-            Vec mean = Vec::Zero();
-            for (const uint32_t i : members[c]) mean += sites[i];
-            centers[c] = mean / static_cast<double>(members[c].size());
-        }
-    }
-    // The ellipsoid with a cluster's mean and covariance, were the cluster an ellipsoid itself, a voxel thicker.
+    std::vector<Vec> sites;
+    for (const uint32_t cell : cells) sites.push_back(voxels.box(cell).center());
     std::vector<Cluster> out;
-    const double thickness = voxels.pitch() * voxels.pitch() / 4;
-    for (const std::vector<uint32_t>& list : members) {
+    for (const std::vector<uint32_t>& list : lloyd(sites, far_apart(sites, k, seed))) {
         if (list.empty()) continue;
-        Cluster cluster;
-        Vec mean = Vec::Zero();
-        for (const uint32_t i : list) mean += sites[i], cluster.cells.push_back(cells[i]);
-        mean /= static_cast<double>(list.size());
-        Mat covariance = Mat::Zero();
-        for (const uint32_t i : list) covariance += (sites[i] - mean) * (sites[i] - mean).transpose();
-        covariance *= 5 / static_cast<double>(list.size());
-        cluster.fit = capped(mean, covariance + thickness * Mat::Identity(), min_radius);
+        Cluster cluster{fit_of(sites, list, voxels.pitch(), min_radius), {}};
+        for (const uint32_t i : list) cluster.cells.push_back(cells[i]);
         out.push_back(std::move(cluster));
     }
     return out;

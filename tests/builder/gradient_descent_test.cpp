@@ -1,6 +1,6 @@
 // The joint descent: onto solids whose best covers are known.
 #include "builder/columns.hpp"
-#include "builder/descent.hpp"
+#include "builder/gradient_descent.hpp"
 #include "builder/random.hpp"
 #include "tests/shapes.hpp"
 

@@ -1,4 +1,4 @@
-#include "builder/descent.hpp"
+#include "builder/gradient_descent.hpp"
 
 #include "builder/central.hpp"
 #include "builder/job.hpp"
@@ -44,10 +44,10 @@ Coordinates coordinates_of(const Vec& s, const Mat& g) {
     return {s.x(), s.y(), s.z(), g(0, 0), g(1, 1), g(2, 2), g(0, 1), g(0, 2), g(1, 2)};
 }
 
-class Descent {
+class GradientDescent {
 public:
-    Descent(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
-            std::vector<uint32_t> owner, const DescentOptions& options)
+    GradientDescent(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
+                    std::vector<uint32_t> owner, const DescentOptions& options)
         : fits_(fits), field_(field), points_(points), owner_(std::move(owner)), options_(options),
           random_(options.seed), directions_(even_directions(options.directions)), rotated_(directions_.size()),
           multiplier_(points.size(), 0), momentum_(fits_.size()) {}
@@ -283,7 +283,7 @@ private:
 
 void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
              std::vector<uint32_t> owner, const DescentOptions& options) {
-    Descent(fits, field, points, std::move(owner), options).run();
+    GradientDescent(fits, field, points, std::move(owner), options).run();
 }
 
 std::vector<Vec> even_directions(int count) {
