@@ -9,6 +9,7 @@
 #include "builder/hausdorff.hpp"
 #include "builder/hulls.hpp"
 #include "builder/job.hpp"
+#include "builder/resolution.hpp"
 
 #include "src/format.hpp"
 
@@ -29,20 +30,6 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-constexpr uint32_t kMaxResolution = 320;
-constexpr uint32_t kMaxFieldResolution = 256;
-constexpr double kFieldResolution = 1.25; // of the distance field, against the voxels'
-constexpr double kPiecesPerLeaf = 40;     // fewer, and leaves follow the grid instead of the shape
-constexpr double kCellsPerLeaf = 24;      // of the coarser grid that the optimisation starts from
-constexpr uint32_t kLeastCells = 48;      // of that grid, along the longest side
-constexpr int kMeterColumns = 192;        // to compare covers while baking
-constexpr int kMeasureColumns = 512;      // of the reported figures
-
-// A solid of less than this share of its diagonal's cube has no inside worth the name.
-constexpr double kNoInside = 1e-12;
-// Volume that may lie in several overlapping parts of a mesh, for the analytic method: share of the solid.
-constexpr double kMostOverlap = 1e-3;
-
 // One build, start to end. Members are in the order in which they come to life.
 class Bake {
 public:
@@ -56,62 +43,45 @@ public:
 
 private:
     Result<Build> run(MeshView input) {
-        const auto start = Clock::now();
         auto cleaned = clean(input, options_.weld);
         if (!cleaned) return cleaned.error();
+        report_ = cleaned->report;
         mesh_ = cleaned->mesh.view();
-        closed_ = cleaned->report.closed;
-        margin_ = cleaned->report.weld_distance;
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
-        if (options_.exact) return run_exact(cleaned->report, start);
-        report("voxelise", 0, 0);
-
-        const Winding winding(mesh_);
-        Pieces pieces = cut_pieces(winding);
-        report("voxelise", 0.04, 0);
-        const Columns columns = measure_solid(winding);
-        if (options_.tolerance > 0 && solid_.value == 0)
-            return Error{ErrorCode::bad_mesh,
-                         "the mesh encloses no volume, so no outside ratio can be met; "
-                         "give levels or a count instead of a tolerance",
-                         0};
-        if (options_.method == Method::analytic) {
-            const WindingDefect& defect = columns.winding_defect();
-            winding_sign_ = defect.inward < defect.outward ? -1 : 1;
-            if (!closed_ || std::min(defect.inward, defect.outward) > kMostOverlap * solid_.value)
-                return Error{ErrorCode::bad_mesh,
-                             "the analytic method needs a closed mesh whose parts do not overlap; use the voxel method",
-                             0};
-        }
-        report("fit", 0.05, 1);
-
-        const Grown grown = grow_tree(pieces, winding);
-
-        std::vector<format::PackedLevel> levels;
-        if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
-        const BakeInfo info = describe(grown.goal_reached);
-        // Measured on decoded nodes, so that the figures are the file's; they are then written into its levels table.
-        std::vector<LevelReport> figures;
-        {
-            auto draft = Tree::open(format::encode(info, options_.degree, lattice_, levels));
-            if (!draft) return draft.error();
-            figures = measure(draft->view(), grown, columns, winding, levels);
-        }
-        auto tree = Tree::open(format::encode(info, options_.degree, lattice_, levels));
-        if (!tree) return tree.error();
-
-        if (auto proved = prove(tree->view(), figures); !proved) return proved.error();
-        return Build{std::move(*tree),   cleaned->report, std::move(figures), solid_.value,       solid_.error,
-                     box_.size().norm(), resolution_,     !closed_,           grown.goal_reached, seconds_since(start)};
+        return options_.exact ? bake_exact() : bake_ellipsoids();
     }
 
-    Result<Build> run_exact(const MeshReport& mesh_report, Clock::time_point start) {
+    // Voxelise, grow, quantise, measure, prove.
+    Result<Build> bake_ellipsoids() {
+        report("voxelise", 0, 0);
+        const Winding winding(mesh_);
+        resolution_ = effort_.resolution;
+        Pieces pieces = cut_pieces(mesh_, closed(), winding, expected_leaves(options_), resolution_,
+                                   [this] { report("voxelise", 0.01, 0); });
+        report("voxelise", 0.04, 0);
+        const Columns columns = measure_solid(winding);
+        if (auto possible = check(columns); !possible) return possible.error();
+
+        report("fit", 0.05, 1);
+        const Grown grown = grow_tree(pieces, winding);
+        std::vector<format::PackedLevel> levels;
+        if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
+        std::vector<LevelReport> figures = measure(grown, columns, winding, levels);
+        return finish(Tree::open(format::encode(describe(grown.goal_reached), options_.degree, lattice_, levels)),
+                      std::move(figures), grown.goal_reached);
+    }
+
+    // Split the triangles, bound them, prove.
+    Result<Build> bake_exact() {
         report("measure", 0, 0);
-        if (closed_) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
+        if (closed()) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
         report("split", 0.1, 1);
-        ExactOptions options{options_.degree, options_.leaf_triangles, min_radius(), margin_, {}};
-        options.progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); };
-        const auto grown = grow_exact(mesh_, options);
+        const auto grown =
+            grow_exact(mesh_, {.degree = options_.degree,
+                               .leaf_triangles = options_.leaf_triangles,
+                               .min_radius = min_radius(),
+                               .margin = report_.weld_distance,
+                               .progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); }});
         if (!grown) return grown.error();
         std::vector<std::byte> bytes =
             format::encode(describe(true), options_.degree, grown->lattice, grown->levels, grown->packed());
@@ -119,22 +89,51 @@ private:
         const auto without_hulls = TreeView::open(bytes, {.check_hash = false}); // Tree::open() checks the whole
         if (!without_hulls) return without_hulls.error();
         format::store_hulls(bytes, hulls_of(*without_hulls));
-        auto tree = Tree::open(std::move(bytes));
-        if (!tree) return tree.error();
 
-        std::vector<LevelReport> figures(tree->view().level_count()); // of a cover of the surface alone: none
-        for (uint32_t l = 0; l < figures.size(); ++l) {
-            figures[l].bytes = tree->view().level(l).end_byte;
-            tree->view().for_each_in_cut(l, [&](uint32_t) { ++figures[l].nodes; });
-        }
+        std::vector<LevelReport> figures(grown->levels.size()); // of a cover of the surface alone: none but these
+        for (uint32_t l = 0; l < figures.size(); ++l)
+            without_hulls->for_each_in_cut(l, [&](uint32_t) { ++figures[l].nodes; });
+        return finish(Tree::open(std::move(bytes)), std::move(figures), true);
+    }
+
+    Result<Build> finish(Result<Tree> tree, std::vector<LevelReport> figures, bool goal_reached) {
+        if (!tree) return tree.error();
+        for (uint32_t l = 0; l < figures.size(); ++l) figures[l].bytes = tree->view().level(l).end_byte;
         if (auto proved = prove(tree->view(), figures); !proved) return proved.error();
-        return Build{std::move(*tree),   mesh_report, std::move(figures), solid_.value, solid_.error,
-                     box_.size().norm(), 0,           !closed_,           true,         seconds_since(start)};
+        return Build{.tree = std::move(*tree),
+                     .mesh = report_,
+                     .levels = std::move(figures),
+                     .solid_volume = solid_.value,
+                     .solid_volume_error = solid_.error,
+                     .diagonal = box_.size().norm(),
+                     .resolution = resolution_,
+                     .surface_mode = !closed(),
+                     .goal_reached = goal_reached,
+                     .seconds = seconds_since(start_)};
+    }
+
+    // Can what is asked be done with this solid?
+    Result<void> check(const Columns& columns) const {
+        // Volume that may lie in several overlapping parts of a mesh, for the analytic method: share of the solid.
+        constexpr double kMostOverlap = 1e-3;
+        if (options_.tolerance > 0 && solid_.value == 0)
+            return Error{ErrorCode::bad_mesh,
+                         "the mesh encloses no volume, so no outside ratio can be met; "
+                         "give levels or a count instead of a tolerance",
+                         0};
+        if (options_.method == Method::analytic &&
+            !(closed() && columns.winding_defect().outward <= kMostOverlap * solid_.value))
+            return Error{ErrorCode::bad_mesh,
+                         "the analytic method needs a closed mesh whose parts do not overlap; use the voxel method", 0};
+        return {};
     }
 
     // Sets the solid's volume, unless it is too small to be one.
     Columns measure_solid(const Winding& winding) {
-        Columns columns = measuring_columns(mesh_, closed_, winding, kMeasureColumns);
+        // A solid of less than this share of its diagonal's cube has no inside worth the name.
+        constexpr double kNoInside = 1e-12;
+        constexpr int kColumns = 512; // across
+        Columns columns = measuring_columns(mesh_, closed(), winding, kColumns);
         const Quadrature solid = columns.volume();
         if (solid.value > kNoInside * std::pow(box_.size().norm(), 3)) solid_ = solid;
         return columns;
@@ -170,62 +169,36 @@ private:
         const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
         return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
     }
+    bool closed() const { return report_.closed; }
     // A volume as a share of the solid's.
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 
-    // Leaves to expect, for the choice of the resolution.
-    double expected_leaves() const {
-        if (options_.ellipsoids) return options_.ellipsoids;
-        if (options_.tolerance > 0 || options_.distance > 0) return 1000;
-        return std::min(std::pow(double(options_.degree), options_.levels ? options_.levels : 3u), 65536.0);
-    }
-
-    // Fine enough for the leaves to come.
-    Pieces cut_pieces(const Winding& winding) {
-        resolution_ = effort_.resolution;
-        for (;;) {
-            report("voxelise", 0.01, 0);
-            Pieces pieces(mesh_, closed_, winding, resolution_);
-            if (pieces.size() >= kPiecesPerLeaf * expected_leaves() || resolution_ == kMaxResolution) return pieces;
-            resolution_ = finer(resolution_, kPiecesPerLeaf * expected_leaves() / pieces.size());
-        }
-    }
-    Voxels start_cells(const Winding& winding) const {
-        for (uint32_t resolution = std::min(kLeastCells, resolution_);;) {
-            Voxels cells(mesh_, closed_, winding, resolution);
-            if (cells.cell_count() >= kCellsPerLeaf * expected_leaves() || resolution == resolution_) return cells;
-            resolution =
-                std::min(resolution_, finer(resolution, kCellsPerLeaf * expected_leaves() / cells.cell_count()));
-        }
-    }
-    // A resolution that gives about `times` as many cells: they grow with its square (surface) to its cube (volume).
-    static uint32_t finer(uint32_t resolution, double times) {
-        const double grown = std::ceil(resolution * std::clamp(std::sqrt(times), 1.05, 2.0));
-        return std::min(kMaxResolution, static_cast<uint32_t>(grown));
-    }
-
     Grown grow_tree(Pieces& pieces, const Winding& winding) {
-        const auto field_resolution = static_cast<uint32_t>(kFieldResolution * resolution_);
-        const DistanceField field(mesh_, closed_, winding, std::min(field_resolution, kMaxFieldResolution));
-        const Voxels cells = start_cells(winding);
-        const Columns columns = measuring_columns(mesh_, closed_, winding, kMeterColumns);
-        const GrowOptions options{options_, effort_, min_radius(), box_.size().norm(),
-                                  [&](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); }};
-        const auto exact = [&winding, sign = winding_sign_](const Fit& fit) {
-            EllipsoidVolume inside = inside_volume(fit, winding);
-            inside.volume *= sign, inside.d_center *= sign, inside.d_shape *= sign;
-            return outside_volume(fit, inside);
-        };
+        constexpr int kColumns = 192; // across, to compare covers by: fewer than to measure them
+        const DistanceField field(mesh_, closed(), winding, field_resolution(resolution_));
+        const Voxels cells = start_cells(mesh_, closed(), winding, expected_leaves(options_), resolution_);
+        const Columns columns = measuring_columns(mesh_, closed(), winding, kColumns);
+        const auto exact = [&winding](const Fit& fit) { return outside_volume(fit, inside_volume(fit, winding)); };
         const auto distance = [&](std::span<const Ellipsoid> cover) {
-            const HausdorffDistance found = hausdorff_distance(cover, winding, closed_, distance_tolerance(), 1);
+            const HausdorffDistance found = hausdorff_distance(cover, winding, closed(), distance_tolerance(), 1);
             return found.max + found.max_error;
         };
-        Solid solid{pieces, cells, field, columns, surface_area(), {}, distance};
-        if (options_.method == Method::analytic) solid.outside = exact;
-        return grow(solid, options);
+        const Solid solid{.pieces = pieces,
+                          .cells = cells,
+                          .field = field,
+                          .columns = columns,
+                          .area = surface_area(),
+                          .outside = options_.method == Method::analytic ? decltype(Solid::outside)(exact) : nullptr,
+                          .distance = distance};
+        const auto progress = [this](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); };
+        return grow(solid, {.build = options_,
+                            .effort = effort_,
+                            .min_radius = min_radius(),
+                            .diagonal = box_.size().norm(),
+                            .progress = progress});
     }
 
-    // Quantised nodes, breadth-first, each enlarged until its decoded ellipsoid covers.
+    // Quantised nodes, by levels, each enlarged until its decoded ellipsoid covers.
     Result<void> pack(const Grown& grown, const Pieces& pieces, std::vector<format::PackedLevel>& levels) {
         Box centers;
         double size = 0;
@@ -234,25 +207,18 @@ private:
             size = std::max(size, node.fit.half_extents().maxCoeff());
         }
         lattice_ = format::lattice_for(centers.low.data(), centers.high.data(), size);
-        surface_errors_.resize(grown.nodes.size());
-        std::vector<uint32_t> current{0};
-        while (!current.empty()) {
-            std::vector<uint32_t> next;
-            format::PackedLevel& level = levels.emplace_back();
-            for (const uint32_t index : current) {
-                const GrownNode& node = grown.nodes[index];
-                auto packed = covering_node(node.fit, pieces, node.pieces, lattice_, margin_);
-                if (!packed)
-                    return Error{ErrorCode::bad_mesh,
-                                 "the mesh is too large or too small for the file format; "
-                                 "scale it to metres",
-                                 index};
-                packed->child_count = static_cast<uint8_t>(node.child_count);
-                surface_errors_[index] = surface_error(Fit(format::decode(*packed, lattice_)), pieces, node.pieces);
-                level.nodes.push_back(*packed);
-                for (uint32_t c = 0; c < node.child_count; ++c) next.push_back(node.first_child + c);
-            }
-            current.swap(next);
+        for (size_t index = 0; index < grown.nodes.size(); ++index) {
+            const GrownNode& node = grown.nodes[index];
+            auto packed = covering_node(node.fit, pieces, node.pieces, lattice_, report_.weld_distance);
+            if (!packed)
+                return Error{ErrorCode::bad_mesh,
+                             "the mesh is too large or too small for the file format; "
+                             "scale it to metres",
+                             index};
+            packed->child_count = static_cast<uint8_t>(node.child_count);
+            surface_errors_.push_back(surface_error(Fit(format::decode(*packed, lattice_)), pieces, node.pieces));
+            levels.resize(node.level + 1);
+            levels.back().nodes.push_back(*packed);
         }
         return {};
     }
@@ -261,7 +227,7 @@ private:
         BakeInfo info;
         info.source_hash = hash(mesh_);
         info.options_hash = hash(options_);
-        info.surface_mode = !closed_;
+        info.surface_mode = !closed();
         info.exact = options_.exact;
         info.proved = true; // or there will be no file, see prove()
         info.goal_reached = goal_reached;
@@ -286,39 +252,53 @@ private:
         return info;
     }
 
-    std::vector<LevelReport> measure(const TreeView& tree, const Grown& grown, const Columns& columns,
-                                     const Winding& winding, std::vector<format::PackedLevel>& levels) {
+    // Of decoded nodes, so that the figures are the file's; they go into its levels table, too.
+    std::vector<LevelReport> measure(const Grown& grown, const Columns& columns, const Winding& winding,
+                                     std::vector<format::PackedLevel>& levels) {
         std::vector<LevelReport> figures;
-        for (uint32_t l = 0; l < tree.level_count(); ++l) {
-            report("measure", 0.8 + 0.05 * l / tree.level_count(), tree.node_count());
+        std::vector<Ellipsoid> leaves; // above the level
+        double leaf_error = 0;         // their largest surface error
+        size_t first = 0;              // of the level's nodes
+        for (size_t l = 0; l < levels.size(); ++l) {
+            report("measure", 0.8 + 0.05 * static_cast<double>(l) / static_cast<double>(levels.size()),
+                   static_cast<uint32_t>(grown.nodes.size()));
             const auto start = Clock::now();
-            std::vector<Ellipsoid> cut;
-            tree.for_each_in_cut(l, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
-            const CoverVolume volume = measure_cover(columns, cut);
-            LevelReport figure;
-            figure.surface_error = 0;
-            for (size_t n = 0; n < grown.nodes.size(); ++n)
-                if (grown.nodes[n].level == l || (grown.nodes[n].level < l && grown.nodes[n].child_count == 0))
-                    figure.surface_error = std::max(figure.surface_error, surface_errors_[n]);
-            figure.nodes = static_cast<uint32_t>(cut.size());
-            figure.bytes = tree.level(l).end_byte;
-            figure.union_volume = volume.whole.value;
-            if (solid_.value > 0) {
-                figure.outside_ratio = relative(volume.outside.value);
-                figure.outside_ratio_error =
-                    relative(volume.outside.error) + figure.outside_ratio * relative(solid_.error);
-                figure.sum_outside_ratio = relative(volume.sum_outside.value);
+            std::vector<Ellipsoid> cut = leaves;
+            double error = leaf_error;
+            for (size_t n = 0; n < levels[l].nodes.size(); ++n) {
+                const format::PackedNode& node = levels[l].nodes[n];
+                cut.push_back(format::decode(node, lattice_));
+                error = std::max(error, surface_errors_[first + n]);
+                if (node.child_count > 0) continue;
+                leaves.push_back(cut.back());
+                leaf_error = std::max(leaf_error, surface_errors_[first + n]);
             }
-            const HausdorffDistance distance =
-                hausdorff_distance(cut, winding, closed_, distance_tolerance(), effort_.distance_samples);
-            figure.hausdorff_max = distance.max + distance.max_error;
-            figure.hausdorff_mean = distance.mean;
-            figure.hausdorff_p99 = distance.p99;
+            first += levels[l].nodes.size();
+            LevelReport figure = figures_of(cut, columns, winding);
+            figure.surface_error = error;
+            figure.nodes = static_cast<uint32_t>(cut.size());
             figure.seconds = seconds_since(start) + (l < grown.seconds.size() ? grown.seconds[l] : 0);
             levels[l].figures = figure;
             figures.push_back(figure);
         }
         return figures;
+    }
+
+    LevelReport figures_of(std::span<const Ellipsoid> cut, const Columns& columns, const Winding& winding) const {
+        LevelReport out;
+        const CoverVolume volume = measure_cover(columns, cut);
+        out.union_volume = volume.whole.value;
+        if (solid_.value > 0) {
+            out.outside_ratio = relative(volume.outside.value);
+            out.outside_ratio_error = relative(volume.outside.error) + out.outside_ratio * relative(solid_.error);
+            out.sum_outside_ratio = relative(volume.sum_outside.value);
+        }
+        const HausdorffDistance distance =
+            hausdorff_distance(cut, winding, closed(), distance_tolerance(), effort_.distance_samples);
+        out.hausdorff_max = distance.max + distance.max_error;
+        out.hausdorff_mean = distance.mean;
+        out.hausdorff_p99 = distance.p99;
+        return out;
     }
 
     Result<void> prove(const TreeView& tree, std::vector<LevelReport>& figures) {
@@ -352,16 +332,15 @@ private:
     const Effort effort_;
     const ProgressCallback& progress_;
     Job job_;
+    const Clock::time_point start_ = Clock::now();
     std::mutex reporting_;
     BuildProgress reached_{"clean", 0, 0};
 
     MeshView mesh_;
-    bool closed_ = false;
-    double margin_ = 0; // by which welding moved points: they are covered as they stood
+    MeshReport report_;
     Box box_;
     uint32_t resolution_ = 0;
-    Quadrature solid_;        // its volume; 0 where there is no inside
-    double winding_sign_ = 1; // -1: the mesh is inside out
+    Quadrature solid_; // its volume; 0 where there is no inside
     format::Lattice lattice_;
     std::vector<double> surface_errors_; // of the grown nodes, as decoded
 };
