@@ -222,6 +222,70 @@ struct Seen {
     Quadrature solid, whole, outside, sum, sum_outside;
 };
 
+// A row of columns, i: the shapes in it are added first.
+class Row {
+public:
+    struct Sums {
+        Sum solid, whole, outside, sum, sum_outside;
+    };
+
+    Row(const ColumnLattice& lattice, const Columns* solid, int i) : lattice_(lattice), solid_(solid), i_(i) {}
+
+    void add(const Shape& shape) {
+        // |w + z u|^2 = 1 with u = the z-column of L^-1, w = the rest.
+        const Vec u = shape.inverse.col(2);
+        const Vec wx = shape.inverse.col(0) * (lattice_.x0 + i_ * lattice_.dx - shape.c.x());
+        const double uu = u.squaredNorm();
+        for (auto j = static_cast<int>(shape.j0); j <= static_cast<int>(shape.j1); ++j) {
+            const Vec w = wx + shape.inverse.col(1) * (lattice_.y0 + j * lattice_.dy - shape.c.y());
+            const double uw = u.dot(w), discriminant = uw * uw - uu * (w.squaredNorm() - 1);
+            if (discriminant <= 0) continue;
+            const double middle = shape.c.z() - uw / uu, half = std::sqrt(discriminant) / uu;
+            cover_.push_back({j, {middle - half, middle + half}});
+            sums_.sum.add(i_, j, 2 * half);
+            sums_.sum_outside.add(i_, j, outside(j, cover_.back().z));
+        }
+    }
+
+    Sums measure() {
+        for (int j = 0; j < lattice_.ny; ++j)
+            for (const Interval& s : solid_in(j)) sums_.solid.add(i_, j, s.high - s.low);
+        std::sort(cover_.begin(), cover_.end(),
+                  [](const Piece& a, const Piece& b) { return a.j != b.j ? a.j < b.j : a.z.low < b.z.low; });
+        for (size_t k = 0; k < cover_.size();) { // maximal intervals of the union
+            auto [j, piece] = cover_[k];
+            for (++k; k < cover_.size() && cover_[k].j == j && cover_[k].z.low <= piece.high; ++k)
+                piece.high = std::max(piece.high, cover_[k].z.high);
+            sums_.whole.add(i_, j, piece.high - piece.low);
+            sums_.outside.add(i_, j, outside(j, piece));
+        }
+        return sums_;
+    }
+
+private:
+    struct Piece {
+        int j;
+        Interval z;
+    };
+    std::span<const Interval> solid_in(int j) const {
+        const bool known = solid_ != nullptr && i_ >= 0 && i_ < lattice_.nx && j >= 0 && j < lattice_.ny;
+        return known ? solid_->column(i_, j) : std::span<const Interval>();
+    }
+    // What of an interval is outside the solid.
+    double outside(int j, const Interval& s) const {
+        double length = s.high - s.low;
+        for (const Interval& t : solid_in(j))
+            length -= std::max(0.0, std::min(s.high, t.high) - std::max(s.low, t.low));
+        return length;
+    }
+
+    const ColumnLattice& lattice_;
+    const Columns* solid_;
+    int i_;
+    std::vector<Piece> cover_;
+    Sums sums_;
+};
+
 // All columns that meet the shapes; `solid`, of the same lattice, may be null: there is none.
 Seen look(const ColumnLattice& lattice, const Columns* solid, std::span<const Shape> shapes) {
     int row_low = 0, row_high = lattice.nx - 1;
@@ -235,60 +299,14 @@ Seen look(const ColumnLattice& lattice, const Columns* solid, std::span<const Sh
             for (auto i = static_cast<int>(shapes[s].i0); i <= static_cast<int>(shapes[s].i1); ++i)
                 by_row[static_cast<size_t>(i - row_low)].push_back(s);
 
-    struct Row {
-        Sum solid, whole, outside, sum, sum_outside;
-    };
-    std::vector<Row> rows(by_row.size());
+    std::vector<Row::Sums> rows(by_row.size());
     parallel_for(size_t{0}, rows.size(), [&](size_t r) {
-        Row& total = rows[r];
-        const int i = static_cast<int>(r) + row_low;
-        const auto solid_in = [&](int j) {
-            const bool known = solid != nullptr && i >= 0 && i < lattice.nx && j >= 0 && j < lattice.ny;
-            return known ? solid->column(i, j) : std::span<const Interval>();
-        };
-        // What of an interval is outside the solid.
-        const auto outside = [&](int j, const Interval& s) {
-            double length = s.high - s.low;
-            for (const Interval& t : solid_in(j))
-                length -= std::max(0.0, std::min(s.high, t.high) - std::max(s.low, t.low));
-            return length;
-        };
-        struct Piece {
-            int j;
-            Interval z;
-        };
-        std::vector<Piece> cover;
-        const double x = lattice.x0 + i * lattice.dx;
-        for (const uint32_t s : by_row[r]) {
-            checkpoint();
-            const Shape& shape = shapes[s];
-            // |w + z u|^2 = 1 with u = the z-column of L^-1, w = the rest.
-            const Vec u = shape.inverse.col(2), wx = shape.inverse.col(0) * (x - shape.c.x());
-            const double uu = u.squaredNorm();
-            for (auto j = static_cast<int>(shape.j0); j <= static_cast<int>(shape.j1); ++j) {
-                const Vec w = wx + shape.inverse.col(1) * (lattice.y0 + j * lattice.dy - shape.c.y());
-                const double uw = u.dot(w), discriminant = uw * uw - uu * (w.squaredNorm() - 1);
-                if (discriminant <= 0) continue;
-                const double middle = shape.c.z() - uw / uu, half = std::sqrt(discriminant) / uu;
-                cover.push_back({j, {middle - half, middle + half}});
-                total.sum.add(i, j, 2 * half);
-                total.sum_outside.add(i, j, outside(j, cover.back().z));
-            }
-        }
-        for (int j = 0; j < lattice.ny; ++j)
-            for (const Interval& s : solid_in(j)) total.solid.add(i, j, s.high - s.low);
-        std::sort(cover.begin(), cover.end(),
-                  [](const Piece& a, const Piece& b) { return a.j != b.j ? a.j < b.j : a.z.low < b.z.low; });
-        for (size_t k = 0; k < cover.size();) { // maximal intervals of the union
-            auto [j, piece] = cover[k];
-            for (++k; k < cover.size() && cover[k].j == j && cover[k].z.low <= piece.high; ++k)
-                piece.high = std::max(piece.high, cover[k].z.high);
-            total.whole.add(i, j, piece.high - piece.low);
-            total.outside.add(i, j, outside(j, piece));
-        }
+        Row row(lattice, solid, static_cast<int>(r) + row_low);
+        for (const uint32_t s : by_row[r]) checkpoint(), row.add(shapes[s]);
+        rows[r] = row.measure();
     });
-    Row all;
-    for (const Row& row : rows) { // in order: the same sum for any number of threads
+    Row::Sums all;
+    for (const Row::Sums& row : rows) { // in order: the same sum for any number of threads
         all.solid.add(row.solid);
         all.whole.add(row.whole);
         all.outside.add(row.outside);
