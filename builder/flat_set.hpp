@@ -1,8 +1,8 @@
 // One level: a set of ellipsoids that covers the solid by itself (paper, Algorithm 1, steps 5 to 8).
 //
-// A set is optimised as a whole: start (start.hpp), descend (gradient_descent.hpp), polish (polish.hpp). It knows of no other
-// level. Sets are compared by the volume of their union outside the solid. Of a mesh without an inside, that is all of
-// it.
+// A set is optimised as a whole: start (start.hpp), descend (gradient_descent.hpp), polish (polish.hpp). It knows of no
+// other level. Sets are compared by the volume of their union outside the solid. Of a mesh without an inside, that is
+// all of it.
 #pragma once
 
 #include "builder/columns.hpp"
