@@ -69,7 +69,7 @@ private:
             const auto count = static_cast<uint32_t>(most_nodes(l));
             FlatSet set = sets_.make(count, &sets[l - 1], [&](double part) { report((done + part * count) / work); });
             follow_cuts(sets[l - 1], solid_.pieces);
-            if (!(set.outside < sets[l - 1].outside)) set = sets[l - 1];
+            if (!(set.outside < kLeastGain * sets[l - 1].outside)) set = halved(sets[l - 1], count);
             done += count;
             ellipsoids_ += static_cast<uint32_t>(set.parts.size());
             if (set.outside < kLeastGain * least) last = l, least = set.outside;
@@ -81,6 +81,14 @@ private:
         for (FlatSet& set : sets) follow_cuts(set, solid_.pieces);
         make_counts_fit(sets);
         grown_.nodes = stack(sets, options_.build.degree);
+    }
+
+    // `set` with its parts halved, or as it is if that gains nothing: of a sheet much thinner than a cell the field
+    // that guides descents shows nothing, but halves are fitted to its pieces.
+    FlatSet halved(const FlatSet& set, uint32_t count) const {
+        FlatSet halves = set;
+        sets_.split(halves, count);
+        return halves.outside < set.outside ? halves : set;
     }
 
     // Splits parts where a level has too few for those of the next one, or less than the one above.

@@ -72,7 +72,7 @@ TEST_P(LevelsOf, LeavesAreAboutAsTightAsAFlatSet) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Meshes, LevelsOf,
-                         testing::Values(Model{"shell", shell()},
+                         testing::Values(Model{"shell", shell()}, Model{"sheet", shapes::box(1, 1, 1e-4f)},
                                          Model{"loose_boxes", strewn(shapes::box(0.03f, 0.03f, 0.03f), 200)},
                                          Model{"loose_rods", strewn(shapes::box(0.4f, 0.01f, 0.01f), 60)},
                                          Model{"scan_of_loose_parts", strewn(shapes::sheet(0.1f, 0.05f, 2), 60)}),
