@@ -2,8 +2,8 @@
 //
 // Lloyd's idea, with cover as a hard constraint. In turn, each ellipsoid is freed from all pieces that another one
 // holds too: only the pieces that it *alone* holds bind it. It then takes a step down the gradient of the volume that
-// it adds (gradient_descent.hpp), as far as those pieces let it: a quadratic program in nine unknowns with one linear constraint
-// a binding point. What no other ellipsoid needs any more is given free, and the next one profits.
+// it adds (gradient_descent.hpp), as far as those pieces let it: a quadratic program in nine unknowns with one linear
+// constraint a binding point. What no other ellipsoid needs any more is given free, and the next one profits.
 #pragma once
 
 #include "builder/gradient_descent.hpp"
