@@ -122,7 +122,7 @@ private:
                          "give levels or a count instead of a tolerance",
                          0};
         if (options_.method == Method::analytic &&
-            !(closed() && columns.winding_defect().outward <= kMostOverlap * solid_.value))
+            !(closed() && columns.winding_defect() <= kMostOverlap * solid_.value))
             return Error{ErrorCode::bad_mesh,
                          "the analytic method needs a closed mesh whose parts do not overlap; use the voxel method", 0};
         return {};

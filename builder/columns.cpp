@@ -122,7 +122,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
 
     std::vector<std::vector<Interval>> rows(static_cast<size_t>(lattice.nx));
     std::vector<size_t> interval_count(count + 1, 0);
-    std::vector<WindingDefect> defects(static_cast<size_t>(lattice.nx));
+    std::vector<double> defects(static_cast<size_t>(lattice.nx));
     parallel_for(0, lattice.nx, [&](int i) {
         std::vector<Interval>& row = rows[static_cast<size_t>(i)];
         for (int j = 0; j < lattice.ny; ++j) {
@@ -146,8 +146,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
                     number = winding(lattice.from_frame(middle));
                 }
                 if (std::abs(number) < 0.5) continue;
-                defects[static_cast<size_t>(i)].outward += (high - low) * std::abs(std::round(number) - 1);
-                defects[static_cast<size_t>(i)].inward += (high - low) * std::abs(std::round(number) + 1);
+                defects[static_cast<size_t>(i)] += (high - low) * std::abs(std::round(number) - 1);
                 if (row.size() > first && row.back().high == low)
                     row.back().high = high;
                 else
@@ -160,10 +159,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
     for (size_t c = 0; c < count; ++c) begin_[c + 1] = begin_[c] + interval_count[c + 1];
     intervals_.reserve(begin_[count]);
     for (const std::vector<Interval>& row : rows) intervals_.insert(intervals_.end(), row.begin(), row.end());
-    for (const WindingDefect& row : defects) { // in order: the same sum for any number of threads
-        defect_.outward += row.outward * lattice.dx * lattice.dy;
-        defect_.inward += row.inward * lattice.dx * lattice.dy;
-    }
+    for (const double row : defects) defect_ += row * lattice.dx * lattice.dy; // in order: the same for any threads
 }
 
 Quadrature Columns::volume() const {

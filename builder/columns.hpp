@@ -40,13 +40,6 @@ struct Quadrature {
     double error = 0;
 };
 
-/// How far a mesh is from winding around its solid just once: the integral of |w - 1| over the solid, w the winding
-/// number, and that of |w + 1|. The one is 0 for a mesh whose normals point outwards and which does not overlap itself,
-/// the other for such a mesh turned inside out. Then surface integrals give the solid's volumes, or their negatives.
-struct WindingDefect {
-    double outward = 0, inward = 0;
-};
-
 class Columns {
 public:
     /// Casts the columns. The solid is where |winding number| >= 1/2: an inverted shell is solid too. For a closed
@@ -61,14 +54,16 @@ public:
     const ColumnLattice& lattice() const { return lattice_; }
     /// Volume of the solid by these columns.
     Quadrature volume() const;
-    /// By these columns: what is thinner than their distance may go unseen.
-    const WindingDefect& winding_defect() const { return defect_; }
+    /// How far the mesh is from winding around its solid just once: the integral of |w - 1| over the solid, w the
+    /// winding number, cubic metres. Where it is 0, normals point outwards and nothing overlaps, so surface integrals
+    /// give the solid's volumes. By these columns: what is thinner than their distance may go unseen.
+    double winding_defect() const { return defect_; }
 
 private:
     ColumnLattice lattice_;
     std::vector<size_t> begin_;
     std::vector<Interval> intervals_;
-    WindingDefect defect_;
+    double defect_ = 0;
 };
 
 /// About columns_across^2 columns over the mesh, to measure with: a lattice of their own, so that figures are not read

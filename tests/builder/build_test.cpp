@@ -7,6 +7,7 @@
 #include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "src/hash.hpp"
+#include "tests/builder/bakes.hpp"
 #include "tests/shapes.hpp"
 
 #include <prolate/build.hpp>
@@ -22,19 +23,6 @@
 
 namespace prolate {
 namespace {
-
-BuildOptions quick(uint32_t levels = 2) {
-    BuildOptions options;
-    options.levels = levels;
-    options.quality = Quality::fast;
-    return options;
-}
-
-Build must_build(const Mesh& mesh, const BuildOptions& options) {
-    auto built = build(mesh.view(), options);
-    if (!built) throw std::runtime_error(built.error().what);
-    return std::move(*built);
-}
 
 // An independent look: random points of the solid against each level.
 void expect_covered(const Mesh& mesh, const Build& built) {
@@ -90,7 +78,7 @@ bool is_ball(const Ellipsoid& e) {
 
 TEST_P(BuildOf, CoversEveryCut) {
     const Mesh& mesh = GetParam().mesh;
-    const Build built = must_build(mesh, quick());
+    const Build built = must_build(mesh, quick(2));
     EXPECT_EQ(built.levels.size(), built.tree.view().level_count());
     expect_proved(mesh, built);
     expect_covered(mesh, built);
@@ -197,7 +185,7 @@ TEST(Build, SurfaceModeIsAnnounced) {
 
 TEST(Build, SameBytesForAnyNumberOfThreads) {
     const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
-    BuildOptions options = quick();
+    BuildOptions options = quick(2);
     options.threads = 1;
     const Build one = must_build(mesh, options);
     for (const uint32_t threads : {2u, 8u}) {
@@ -214,7 +202,7 @@ TEST(Build, SameBytesForAnyNumberOfThreads) {
 
 TEST(Build, FiguresAreThoseOfTheFile) {
     const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
-    const Build built = must_build(mesh, quick());
+    const Build built = must_build(mesh, quick(2));
     const TreeView tree = built.tree.view();
     const BakeInfo info = tree.bake_info();
     EXPECT_TRUE(info.proved);
@@ -510,7 +498,7 @@ TEST(Build, ReportsProgressAndCanBeCancelled) {
     const Mesh mesh = shapes::sheet(1, 1, 4);
     double last = 0;
     int calls = 0;
-    ASSERT_TRUE(build(mesh.view(), quick(), [&](const BuildProgress& p) {
+    ASSERT_TRUE(build(mesh.view(), quick(2), [&](const BuildProgress& p) {
         EXPECT_GE(p.fraction, last);
         EXPECT_LE(p.fraction, 1);
         last = p.fraction;
@@ -520,7 +508,7 @@ TEST(Build, ReportsProgressAndCanBeCancelled) {
     EXPECT_GT(last, 0.9);
     for (int stop_at = 1; stop_at < calls; stop_at += calls / 3) {
         int seen = 0;
-        const auto built = build(mesh.view(), quick(), [&](const BuildProgress&) { return ++seen < stop_at; });
+        const auto built = build(mesh.view(), quick(2), [&](const BuildProgress&) { return ++seen < stop_at; });
         ASSERT_FALSE(built);
         EXPECT_EQ(built.error().code, ErrorCode::cancelled);
     }
@@ -571,7 +559,7 @@ Tree with_scaled(const TreeView& tree, uint32_t node, double by) {
 
 TEST(Verify, FailsWhenABoundingVolumeHoldsTooLittle) {
     const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
-    const Build built = must_build(mesh, quick());
+    const Build built = must_build(mesh, quick(2));
     const TreeView tree = built.tree.view();
     const auto report = verify(tree, mesh.view());
     ASSERT_TRUE(report);
@@ -599,7 +587,7 @@ TEST(Verify, FailsWhenABoundingVolumeHoldsTooLittle) {
 
 TEST(Verify, FailsWhenOneEllipsoidShrinksByOnePercent) {
     const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
-    const Build built = must_build(mesh, quick());
+    const Build built = must_build(mesh, quick(2));
     const TreeView tree = built.tree.view();
     // The repacked tree itself still covers: what the test finds is the shrinking.
     const auto same = verify(with_scaled(tree, 0, 1).view(), mesh.view());

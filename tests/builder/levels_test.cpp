@@ -1,5 +1,6 @@
 // Trees of a number of levels: their leaves against flat sets of the same number, for solids that few ellipsoids fit
 // badly and many fit well.
+#include "tests/builder/bakes.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
 
@@ -12,19 +13,6 @@
 
 namespace prolate {
 namespace {
-
-BuildOptions quick(uint32_t levels) {
-    BuildOptions options;
-    options.levels = levels;
-    options.quality = Quality::fast;
-    return options;
-}
-
-Build must_build(const Mesh& mesh, const BuildOptions& options) {
-    auto built = build(mesh.view(), options);
-    if (!built) throw std::runtime_error(built.error().what);
-    return std::move(*built);
-}
 
 Mesh shell() { // free in the middle up to 0.894
     Mesh mesh = shapes::icosphere(3);
