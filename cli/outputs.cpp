@@ -133,7 +133,7 @@ Outcome<> Outputs::claim(const std::string& path, const std::string& role, std::
     const std::string folder = parent.empty() ? "." : parent.string();
     if (!fs::exists(path, none) && !fs::is_directory(folder, none))
         return Failure{kIo, path, fmt::format("the folder {} does not exist", folder), "create it first"};
-    if (const auto mine = check_content(path, kind); !mine) return mine;
+    if (auto mine = check_content(path, kind); !mine) return mine;
     if (const auto can = can_save(path.c_str()); !can) return failure_of(path, can.error());
     return kSuccess;
 }

@@ -83,6 +83,6 @@ struct QueryContext {
     static constexpr size_t kEntries = 5120;
     alignas(64) Entry entries[kEntries];
 };
-static_assert(sizeof(QueryContext) == 80 * 1024);
+static_assert(sizeof(QueryContext) == size_t{80} * 1024);
 
 } // namespace prolate
