@@ -31,7 +31,7 @@ public:
         end_level();
         const BuildOptions& goal = options_.build;
         if (goal.ellipsoids)
-            grow_upwards(std::move(root), exactly(goal.ellipsoids, [this](double done) { report(done); }));
+            grow_upwards(root, exactly(goal.ellipsoids, [this](double done) { report(done); }));
         else if (goal.tolerance > 0 || goal.distance > 0)
             grow_upwards(root, meet_limits(root));
         else
