@@ -122,7 +122,7 @@ Failure advised(Failure failure, std::string_view advice) {
 }
 
 Failure caught() {
-    const Failure no_memory{kIo, "memory", "there is not enough of it", kMemoryAdvice};
+    Failure no_memory{kIo, "memory", "there is not enough of it", kMemoryAdvice};
     try {
         throw;
     } catch (const std::bad_alloc&) {
