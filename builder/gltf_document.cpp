@@ -80,20 +80,6 @@ std::string from_base64(std::string_view digits, const GltfValue& place) {
     return out;
 }
 
-// %20 and the like.
-std::string without_escapes(std::string_view uri) {
-    const auto digit = [](char c) -> int {
-        return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
-    };
-    std::string out;
-    for (size_t i = 0; i < uri.size(); ++i) {
-        const bool is_escape = uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0;
-        out += is_escape ? static_cast<char>(16 * digit(uri[i + 1]) + digit(uri[i + 2])) : uri[i];
-        if (is_escape) i += 2;
-    }
-    return out;
-}
-
 // ---- numbers ----
 
 uint64_t size_of_component(const GltfValue& component) {
@@ -135,6 +121,19 @@ double number_at(const std::byte* from, uint64_t component, bool normalised) {
 }
 
 } // namespace
+
+std::string without_escapes(std::string_view uri) {
+    const auto digit = [](char c) -> int {
+        return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
+    };
+    std::string out;
+    for (size_t i = 0; i < uri.size(); ++i) {
+        const bool is_escape = uri[i] == '%' && i + 2 < uri.size() && digit(uri[i + 1]) >= 0 && digit(uri[i + 2]) >= 0;
+        out += is_escape ? static_cast<char>(16 * digit(uri[i + 1]) + digit(uri[i + 2])) : uri[i];
+        if (is_escape) i += 2;
+    }
+    return out;
+}
 
 // ---- values ----
 

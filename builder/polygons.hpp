@@ -91,5 +91,7 @@ Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const 
                            ImportReport& report);
 /// The JSON of a glTF or GLB file; empty if there is none.
 std::string_view gltf_json(std::string_view type, std::string_view bytes);
+/// The path that a glTF's URI names: without %20 and the like.
+std::string without_escapes(std::string_view uri);
 
 } // namespace prolate

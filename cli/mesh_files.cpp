@@ -7,29 +7,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include <charconv>
 #include <filesystem>
 
 namespace prolate::cli {
-namespace {
-
 using Json = nlohmann::json;
-
-// Without %20 and the like.
-std::string without_escapes(const std::string& uri) {
-    std::string out;
-    for (size_t i = 0; i < uri.size(); ++i) {
-        unsigned char c = 0;
-        const char* const end = uri.data() + std::min(i + 3, uri.size());
-        const bool is_escape =
-            uri[i] == '%' && i + 2 < uri.size() && std::from_chars(uri.data() + i + 1, end, c, 16).ptr == end;
-        out += is_escape ? static_cast<char>(c) : uri[i];
-        if (is_escape) i += 2;
-    }
-    return out;
-}
-
-} // namespace
 
 std::vector<std::string> files_beside(const std::string& path) {
     const std::string type = '.' + extension(path);
