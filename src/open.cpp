@@ -40,6 +40,21 @@ template <class T> bool is_metric(T value) {
     return std::isnan(value) || (std::isfinite(value) && value >= 0);
 }
 
+// The counts of an exact tree; of others they are 0.
+Result<void> check_triangle_counts(const std::byte* h, bool exact) {
+    if (!exact) {
+        if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
+            return bad("triangle counts of a tree without triangles", kAtVertexCount);
+        return {};
+    }
+    const uint32_t vertices = load_le<uint32_t>(h + kAtVertexCount);
+    if (vertices == 0) return bad("an exact tree without vertices", kAtVertexCount);
+    if (load_le<uint32_t>(h + kAtTriangleCount) == 0) return bad("an exact tree without triangles", kAtTriangleCount);
+    const uint32_t components = load_le<uint32_t>(h + kAtComponentCount);
+    if (components == 0 || components > vertices) return bad("component count out of range", kAtComponentCount);
+    return {};
+}
+
 // The header on its own: everything that does not need the nodes.
 Result<void> check_header(std::span<const std::byte> bytes) {
     const std::byte* h = bytes.data();
@@ -91,17 +106,7 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     if (!std::isfinite(load_le<float>(h + kAtWeld))) return bad("option out of range", kAtWeld);
     if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
         return bad("reserved bytes are not zero", kAtReserved2);
-    if (!(flags & kExact)) {
-        if (!all_zero(h + kAtVertexCount, kAtDiagonal - kAtVertexCount))
-            return bad("triangle counts of a tree without triangles", kAtVertexCount);
-        return {};
-    }
-    const uint32_t vertices = load_le<uint32_t>(h + kAtVertexCount);
-    if (vertices == 0) return bad("an exact tree without vertices", kAtVertexCount);
-    if (load_le<uint32_t>(h + kAtTriangleCount) == 0) return bad("an exact tree without triangles", kAtTriangleCount);
-    const uint32_t components = load_le<uint32_t>(h + kAtComponentCount);
-    if (components == 0 || components > vertices) return bad("component count out of range", kAtComponentCount);
-    return {};
+    return check_triangle_counts(h, (flags & kExact) != 0);
 }
 
 // What the levels table says.
@@ -309,115 +314,147 @@ private:
     uint64_t children_ = 0, next_triangle_ = 0;
 };
 
+// What the header and the levels table say of the whole file, and which of its levels the bytes hold.
+struct Layout : Levels {
+    uint32_t level_count = 0;
+    bool exact = false;
+    uint64_t total = 0;       // bytes of the whole file
+    uint64_t present_end = 0; // where the last of these levels ends
+};
+
+// The header, the table, and how many bytes there are.
+Result<Layout> check_layout(std::span<const std::byte> bytes, bool check_hash) {
+    if (const auto header = check_header(bytes); !header) return header.error();
+    const std::byte* const h = bytes.data();
+    Layout out;
+    out.level_count = load_le<uint16_t>(h + kAtLevelCount);
+    const size_t table_bytes = table_end(out.level_count);
+    if (bytes.size() < table_bytes) return bad("the file ends inside its levels table", bytes.size());
+    if (check_hash && header_hash(bytes.first(table_bytes)) != load_le<uint64_t>(h + kAtHeaderHash))
+        return bad("the header is damaged (hash mismatch)", kAtHeaderHash);
+
+    out.exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0;
+    const auto levels = check_levels(bytes, out.level_count, out.exact);
+    if (!levels) return levels.error();
+    static_cast<Levels&>(out) = *levels;
+    if (load_le<uint32_t>(h + kAtNodeCount) != out.nodes) return bad("wrong node count", kAtNodeCount);
+    out.total = end_of_blocks(out.level_count, out.bounding_blocks + out.blocks);
+    if (out.exact)
+        out.total +=
+            section_bytes(out.blocks, load_le<uint32_t>(h + kAtVertexCount), load_le<uint32_t>(h + kAtTriangleCount));
+    if (load_le<uint64_t>(h + kAtTotalSize) != out.total) return bad("wrong total size", kAtTotalSize);
+    if (out.present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
+    out.present_end = load_le<uint64_t>(h + kHeaderBytes + (out.present - 1) * kLevelBytes + kLevelEndByte);
+    if (bytes.size() > out.total) return bad("bytes follow the end of the tree", out.total);
+    if (bytes.size() != out.total && bytes.size() != out.present_end)
+        return out.present == out.level_count ? bad("the file is cut off inside its triangles", bytes.size())
+                                              : bad("the file is cut off inside a level", bytes.size());
+    const size_t bounding = bounding_begin(out.level_count);
+    if (const size_t at = first_nonzero(h, table_bytes, bounding); at < bounding)
+        return bad("bytes between the levels table and the nodes are not zero", at);
+    return out;
+}
+
+// One level's nodes: the only root, or the children of the level above.
+Result<void> check_families(NodeCheck& check, const LevelInfo* above) {
+    if (above == nullptr) return check.family(1);
+    for (uint32_t i = 0; i < kBlockLanes * above->block_count; ++i) {
+        const uint32_t children = check.child_count(above->first_slot + i); // none of a lane without a node
+        if (children == 0) continue;
+        if (const auto sound = check.family(children); !sound) return sound;
+    }
+    return {};
+}
+
 } // namespace
 
 Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOptions& options) noexcept {
-    if (const auto header = check_header(bytes); !header) return header.error();
+    const auto layout = check_layout(bytes, options.check_hash);
+    if (!layout) return layout.error();
     const std::byte* const h = bytes.data();
-    const uint32_t level_count = load_le<uint16_t>(h + kAtLevelCount);
-    const size_t table_bytes = table_end(level_count);
-    if (bytes.size() < table_bytes) return bad("the file ends inside its levels table", bytes.size());
-    if (options.check_hash && header_hash(bytes.first(table_bytes)) != load_le<uint64_t>(h + kAtHeaderHash))
-        return bad("the header is damaged (hash mismatch)", kAtHeaderHash);
-
-    const bool exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0;
-    const auto levels = check_levels(bytes, level_count, exact);
-    if (!levels) return levels.error();
-    const auto [nodes, blocks, present, bounding_blocks] = *levels;
-    if (load_le<uint32_t>(h + kAtNodeCount) != nodes) return bad("wrong node count", kAtNodeCount);
-    const uint32_t vertex_count = load_le<uint32_t>(h + kAtVertexCount);
-    const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
-    const uint64_t total = end_of_blocks(level_count, bounding_blocks + blocks) +
-                           (exact ? section_bytes(blocks, vertex_count, triangle_count) : 0);
-    if (load_le<uint64_t>(h + kAtTotalSize) != total) return bad("wrong total size", kAtTotalSize);
-    if (present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
-    const uint64_t present_end = load_le<uint64_t>(h + kHeaderBytes + (present - 1) * kLevelBytes + kLevelEndByte);
-    if (bytes.size() > total) return bad("bytes follow the end of the tree", total);
-    if (bytes.size() != total && bytes.size() != present_end)
-        return present == level_count ? bad("the file is cut off inside its triangles", bytes.size())
-                                      : bad("the file is cut off inside a level", bytes.size());
-
-    const size_t bounding = bounding_begin(level_count);
-    if (const size_t at = first_nonzero(h, table_bytes, bounding); at < bounding)
-        return bad("bytes between the levels table and the nodes are not zero", at);
-    const auto first_block = static_cast<size_t>(end_of_blocks(level_count, bounding_blocks));
-
     TreeView view;
     view.bytes_ = bytes;
-    view.raw_.blocks_ = h + first_block;
-    view.level_count_ = level_count; // for a look beyond the bytes, at the table
-    view.is_prefix_ = bytes.size() < total;
+    view.raw_.blocks_ = h + static_cast<size_t>(end_of_blocks(layout->level_count, layout->bounding_blocks));
+    view.level_count_ = layout->level_count; // for a look beyond the bytes, at the table
+    view.is_prefix_ = bytes.size() < layout->total;
     for (size_t i = 0; i < 3; ++i) view.raw_.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
     view.raw_.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
-    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, view.raw_.lattice_);
+    if (const auto sound = view.open_nodes(layout->present, layout->exact, options.check_hash); !sound)
+        return sound.error();
+    if (!layout->exact || view.is_prefix_) return view;
+    if (const auto sound = view.open_triangles(static_cast<size_t>(layout->present_end), options.check_hash); !sound)
+        return sound.error();
+    return view;
+}
+
+Result<void> TreeView::open_nodes(uint32_t present, bool exact, bool check_hash) noexcept {
+    const std::byte* const h = bytes_.data();
+    const uint32_t level_count = level_count_;
+    const size_t bounding = bounding_begin(level_count), first_block = static_cast<size_t>(raw_.blocks_ - h);
+    NodeCheck check(h, first_block, load_le<uint16_t>(h + kAtDegree), exact, raw_.lattice_);
+    LevelInfo above;
     for (uint32_t l = 0; l < present; ++l) {
-        const LevelInfo level = view.level(l);
-        view.node_count_ += level.node_count;
-        view.block_count_ += level.block_count;
+        const LevelInfo level = this->level(l);
+        node_count_ += level.node_count;
+        block_count_ += level.block_count;
         const size_t level_bytes = level.block_count * kBlockBytes;
         const size_t begin = static_cast<size_t>(level.end_byte) - level_bytes;
-        const auto hash = [&, count = bounding_blocks] {
-            return l > 0 ? hash_bytes(bytes.subspan(begin, level_bytes)) : root_hash(bytes, level_count, count);
+        const auto hash = [&] {
+            return l > 0 ? hash_bytes(bytes_.subspan(begin, level_bytes))
+                         : root_hash(bytes_, level_count, (first_block - bounding) / kBlockBytes);
         };
-        if (options.check_hash && hash() != load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
+        if (check_hash && hash() != load_le<uint64_t>(h + kHeaderBytes + l * kLevelBytes + kLevelHash))
             return bad("the nodes of a level are damaged (hash mismatch)", begin);
-        check.begin_level(view.block_count_);
-        if (l == 0) {
-            if (const auto sound = check.family(1); !sound) return sound.error();
-        } else {
-            const LevelInfo above = view.level(l - 1);
-            for (uint32_t i = 0; i < kBlockLanes * above.block_count; ++i) {
-                const uint32_t children = check.child_count(above.first_slot + i); // none of a lane without a node
-                if (children == 0) continue;
-                if (const auto sound = check.family(children); !sound) return sound.error();
-            }
-        }
-        const LevelInfo below = l + 1 < level_count ? view.level(l + 1) : LevelInfo{};
+        check.begin_level(block_count_);
+        if (const auto sound = check_families(check, l > 0 ? &above : nullptr); !sound) return sound;
+        const LevelInfo below = l + 1 < level_count ? this->level(l + 1) : LevelInfo{};
         if (check.children() != below.node_count || check.child_blocks() != below.block_count)
             return bad("the children of a level are not the next level", begin);
+        above = level;
     }
-    view.level_count_ = present;
-    view.root_ = view.ellipsoid(0);
+    level_count_ = present;
+    root_ = ellipsoid(0);
     if (!exact) {
-        view.raw_.bounding_blocks_ = h + bounding;
-        view.raw_.bounding_count_ = view.first_slot(present - 1) / kBlockLanes;
-        for (uint32_t b = 0; b < view.raw_.bounding_count_; ++b)
-            if (const auto sound = check.bounding_block(b, bounding + size_t{b} * kBlockBytes); !sound)
-                return sound.error();
+        raw_.bounding_blocks_ = h + bounding;
+        raw_.bounding_count_ = first_slot(present - 1) / kBlockLanes;
+        for (uint32_t b = 0; b < raw_.bounding_count_; ++b)
+            if (const auto sound = check.bounding_block(b, bounding + size_t{b} * kBlockBytes); !sound) return sound;
     }
-    view.root_bound_ = view.bound(0);
-    const uint64_t next_triangle = check.triangles();
-    if (next_triangle > triangle_count || (present == level_count && next_triangle != triangle_count))
+    root_bound_ = bound(0);
+    const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
+    if (check.triangles() > triangle_count || (present == level_count && check.triangles() != triangle_count))
         return bad("the leaves do not share out the triangles", kAtTriangleCount);
-    if (!exact || view.is_prefix_) return view;
+    return {};
+}
 
-    const auto hulls = static_cast<size_t>(present_end);
-    const size_t hull_bytes = view.block_count_ * kHullBytes, hash = hulls + hull_bytes;
+Result<void> TreeView::open_triangles(size_t hulls, bool check_hash) noexcept {
+    const std::byte* const h = bytes_.data();
+    const size_t hull_bytes = block_count_ * kHullBytes, hash = hulls + hull_bytes;
     const size_t vertices = hash + kSectionHashBytes;
-    if (options.check_hash && section_hash(bytes.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
+    if (check_hash && section_hash(bytes_.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
         return bad("the triangles are damaged (hash mismatch)", hash);
     for (size_t at = hulls; at < hash; at += kHullBytes)
         if (const size_t found = first_nonzero(h, at + kHullReserved, at + kHullBytes); found < at + kHullBytes)
             return bad("reserved bytes are not zero", found);
-    view.raw_.hulls_ = h + hulls;
-    view.raw_.vertices_ = h + vertices;
-    view.raw_.triangles_ = view.raw_.vertices_ + size_t{vertex_count} * kVertexBytes;
-    view.vertex_count_ = vertex_count;
-    view.triangle_count_ = triangle_count;
-    view.component_count_ = load_le<uint32_t>(h + kAtComponentCount);
-    for (uint32_t v = 0; v < vertex_count; ++v) {
-        const Vec3 p = view.vertex(v);
+    vertex_count_ = load_le<uint32_t>(h + kAtVertexCount);
+    triangle_count_ = load_le<uint32_t>(h + kAtTriangleCount);
+    component_count_ = load_le<uint32_t>(h + kAtComponentCount);
+    raw_.hulls_ = h + hulls;
+    raw_.vertices_ = h + vertices;
+    raw_.triangles_ = raw_.vertices_ + size_t{vertex_count_} * kVertexBytes;
+    for (uint32_t v = 0; v < vertex_count_; ++v) {
+        const Vec3 p = vertex(v);
         for (const float x : {p.x, p.y, p.z})
             if (!(std::abs(x) <= kLargestCoordinate)) // also a NaN
                 return bad("a vertex is not finite, or beyond the largest coordinate (2^74 m)",
                            vertices + size_t{v} * kVertexBytes);
     }
-    for (uint32_t t = 0; t < triangle_count; ++t)
-        for (const uint32_t corner : view.triangle(t))
-            if (corner >= vertex_count)
+    for (uint32_t t = 0; t < triangle_count_; ++t)
+        for (const uint32_t corner : triangle(t))
+            if (corner >= vertex_count_)
                 return bad("a triangle names a vertex that does not exist",
-                           static_cast<size_t>(view.raw_.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count));
-    return view;
+                           static_cast<size_t>(raw_.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count_));
+    return {};
 }
 
 } // namespace prolate

@@ -155,6 +155,8 @@ public:
 
 private:
     TreeView() = default;
+    Result<void> open_nodes(uint32_t present, bool exact, bool check_hash) noexcept;
+    Result<void> open_triangles(size_t hulls, bool check_hash) noexcept;
     template <class Visit> void for_each_node_in(uint32_t begin, uint32_t end, Visit&& visit) const {
         for (uint32_t slot = begin; slot < end; ++slot)
             if (is_node(slot)) visit(slot);
