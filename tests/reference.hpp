@@ -34,6 +34,18 @@ inline Vector operator*(const Matrix& m, const Vector& v) {
 inline Vector operator-(const Vector& a, const Vector& b) {
     return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
+inline Vector operator+(const Vector& a, const Vector& b) {
+    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+inline Vector along(const Vector& p, Real t, const Vector& d) {
+    return {p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]};
+}
+inline Vector vector(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+inline Real length(const Vector& v) {
+    return std::sqrt(dot(v, v));
+}
 inline Matrix transposed(const Matrix& m) {
     return {{{m[0][0], m[1][0], m[2][0]}, {m[0][1], m[1][1], m[2][1]}, {m[0][2], m[1][2], m[2][2]}}};
 }
@@ -58,7 +70,6 @@ struct Pair {
 
     Pair(const Ellipsoid& a, const Pose& pose_a, const Ellipsoid& b, const Pose& pose_b) {
         const Matrix ra = rotation(pose_a.rotation), rb = rotation(pose_b.rotation);
-        const auto vector = [](const Vec3& v) { return Vector{v.x, v.y, v.z}; };
         const auto factor = [](const Ellipsoid& e) {
             return Matrix{{{e.l11, 0, 0}, {e.l21, e.l22, 0}, {e.l31, e.l32, e.l33}}};
         };

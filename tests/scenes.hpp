@@ -82,6 +82,12 @@ inline Point rotate(const Quat& q, const Point& p) {
     return out;
 }
 
+/// Turned at random, `offset` metres from the origin in a random direction.
+inline Pose pose_at(Random& random, double offset) {
+    const Point d = random.direction();
+    return {to_float({offset * d[0], offset * d[1], offset * d[2]}), random.rotation()};
+}
+
 /// Lower Cholesky factor of a positive definite matrix, as an ellipsoid {center + L u}.
 inline Ellipsoid from_shape(const Point& center, const std::array<Point, 3>& q) {
     const double l11 = std::sqrt(q[0][0]), l21 = q[1][0] / l11, l31 = q[2][0] / l11;

@@ -1,7 +1,7 @@
 # cmake -D ROOT=<source tree> -D WORK=<scratch folder> -P include_graph_selftest.cmake
 #
 # Plants in a copy of query/ what include_graph.cmake is to find, and demands that it does: a cycle of two units, one
-# that leads through an -inl.hpp, one level too many, and no units at all. What is allowed must pass.
+# that leads through an -inl.hpp, one of two folders, one level too many, and no units at all. What is allowed must pass.
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")
@@ -30,6 +30,13 @@ file(WRITE "${WORK}/query/planted/two-inl.hpp" "")
 file(WRITE "${WORK}/query/planted/two.hpp" "#include \"query/planted/one.hpp\"\n")
 check("include each other.* planted/one planted/two" "a cycle of two headers")
 file(REMOVE_RECURSE "${WORK}/query/planted")
+
+file(WRITE "${WORK}/query/planted/one.hpp" "#include \"query/other/two.hpp\"\n")
+file(WRITE "${WORK}/query/planted/two.hpp" "")
+file(WRITE "${WORK}/query/other/one.hpp" "#include \"query/planted/two.hpp\"\n")
+file(WRITE "${WORK}/query/other/two.hpp" "")
+check("folders that include each other.* (planted other|other planted)" "a cycle of two folders")
+file(REMOVE_RECURSE "${WORK}/query/planted" "${WORK}/query/other")
 
 foreach(i RANGE 1 40)
   math(EXPR next "${i} + 1")

@@ -20,23 +20,16 @@
 namespace prolate {
 namespace {
 
+using reference::along;
+using reference::length;
 using reference::Matrix;
 using reference::Real;
+using reference::vector;
 using reference::Vector;
 using reference::operator*;
 using reference::operator-;
 using scenes::Point;
 using scenes::Random;
-
-Vector vector(const Vec3& v) {
-    return {v.x, v.y, v.z};
-}
-Real length(const Vector& v) {
-    return std::sqrt(reference::dot(v, v));
-}
-Vector along(const Vector& p, Real t, const Vector& d) {
-    return {p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]};
-}
 
 // A ray in a body's frame, not rounded.
 struct TrueRay {
@@ -484,11 +477,6 @@ Brute brute_triangles(const TreeView& tree, const Pose& pose, const Ray& ray, do
     return out;
 }
 
-Pose random_pose(Random& random, double offset) {
-    const Point d = random.direction();
-    return {scenes::to_float({offset * d[0], offset * d[1], offset * d[2]}), random.rotation()};
-}
-
 // A ray at the mesh from somewhere around: at a vertex, at the middle of an edge, or anywhere.
 Ray aimed(Random& random, const Mesh& mesh, const Pose& pose, double size) {
     const Triangle t = mesh.triangles[random.below(static_cast<uint32_t>(mesh.triangles.size()))];
@@ -517,7 +505,7 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
         int met = 0, budgets = 0;
         const int count = 500;
         for (int n = 0; n < count; ++n) {
-            const Pose pose = random_pose(random, n % 2 == 0 ? 0 : 100 * size);
+            const Pose pose = scenes::pose_at(random, n % 2 == 0 ? 0 : 100 * size);
             const Ray ray = aimed(random, scene.mesh, pose, size);
             QueryOptions options;
             if (n % 3 == 0) options.margin = static_cast<float>(size * random.log_in(1e-4, 0.3));
@@ -561,7 +549,7 @@ TEST(Raycast, ClosedMeshesHaveNoHoles) {
     const auto tree = *TreeView::open(scene.bytes);
     Random random(6);
     for (int n = 0; n < 5'000; ++n) {
-        const Pose pose = random_pose(random, n % 3 == 0 ? 1e4 : 1);
+        const Pose pose = scenes::pose_at(random, n % 3 == 0 ? 1e4 : 1);
         const Triangle t = scene.mesh.triangles[random.below(static_cast<uint32_t>(scene.mesh.triangles.size()))];
         const Vector a = vector(scene.mesh.vertices[t[0]]), b = vector(scene.mesh.vertices[t[random.below(2)]]);
         const Matrix r = reference::rotation(pose.rotation);
@@ -582,7 +570,7 @@ TEST(Raycast, ProxyTreesAnswerAsTheirLeavesDo) {
             scenes::tree(random, scenes::cloud(random, 2'000), {.levels = 5, .stop_probability = 0.1});
         const auto tree = *TreeView::open(scene.bytes);
         for (int n = 0; n < 300; ++n) {
-            const Pose pose = random_pose(random, 10);
+            const Pose pose = scenes::pose_at(random, 10);
             const Point p = random.in_ball(), d = random.direction();
             const Ray ray = ray_through(random, pose, {p[0], p[1], p[2]}, {d[0], d[1], d[2]}, kScales[0]);
             QueryOptions options;
@@ -646,7 +634,7 @@ TEST(Raycast, CutsAreMetWhole) {
         std::vector<float> growth(tree.slot_count());
         node_growth(tree, growth);
         for (int n = 0; n < 300; ++n) {
-            const Pose pose = random_pose(random, 10);
+            const Pose pose = scenes::pose_at(random, 10);
             const Point p = random.in_ball(), d = random.direction();
             const Ray ray = ray_through(random, pose, {p[0], p[1], p[2]}, {d[0], d[1], d[2]}, kScales[0]);
             const TrueRay true_ray = placed(ray, pose);
@@ -766,7 +754,7 @@ TEST(Raycast, SameBitsOnEveryTarget) {
         Random random(9);
         std::vector<uint64_t> bits;
         for (int n = 0; n < 300; ++n) {
-            const Pose pose = random_pose(random, 1);
+            const Pose pose = scenes::pose_at(random, 1);
             const Ray ray = aimed(random, scene.mesh, pose, 1);
             const QueryOptions options{.max_level = n % 5 == 0 ? 2 : kMaxLevels, .margin = n % 3 == 0 ? 0.1f : 0.0f};
             const RaycastResult r =

@@ -67,6 +67,7 @@ using glm::dmat3;
 using glm::dvec3;
 using query::PlacedHalfSpace;
 using query::RoundedBox;
+using reference::along;
 using reference::Matrix;
 using reference::Real;
 using reference::Vector;
@@ -75,9 +76,6 @@ using reference::operator-;
 using scenes::Point;
 using scenes::Random;
 
-Vector along(const Vector& p, Real t, const Vector& d) {
-    return {p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]};
-}
 Vector unit(const Vector& v) {
     const Real length = std::sqrt(reference::dot(v, v));
     return {v[0] / length, v[1] / length, v[2] / length};
@@ -368,11 +366,6 @@ AnyShape random_shape(Random& random, const Pose& pose, double extent) {
     }
 }
 
-Pose random_pose(Random& random, double offset) {
-    const Point d = random.direction();
-    return {scenes::to_float({offset * d[0], offset * d[1], offset * d[2]}), random.rotation()};
-}
-
 TEST(Shapes, ExactTreesAnswerAsAllTheirTrianglesDo) {
     const std::pair<Mesh, double> meshes[] = {{shapes::torus(1, 0.3f, 30, 12), 1.3},
                                               {shapes::moved(shapes::box(2, 2, 2), {-1, -1, -1}), 1.7},
@@ -386,7 +379,7 @@ TEST(Shapes, ExactTreesAnswerAsAllTheirTrianglesDo) {
         int overlapping = 0, enclosed = 0, undecided = 0;
         const int count = 600;
         for (int k = 0; k < count; ++k) {
-            const Pose pose = random_pose(random, k % 2 == 0 ? 0 : 100 * extent);
+            const Pose pose = scenes::pose_at(random, k % 2 == 0 ? 0 : 100 * extent);
             const AnyShape s = random_shape(random, pose, extent);
             QueryOptions options;
             if (k % 3 == 0) options.margin = static_cast<float>(extent * random.log_in(1e-3, 0.3));
@@ -430,7 +423,7 @@ TEST(Shapes, ProxyTreesAnswerAsTheirLeavesDo) {
             scenes::tree(random, scenes::cloud(random, 2'000), {.levels = 5, .stop_probability = 0.1});
         const auto tree = *TreeView::open(scene.bytes);
         for (int k = 0; k < 200; ++k) {
-            const Pose pose = random_pose(random, 10);
+            const Pose pose = scenes::pose_at(random, 10);
             const AnyShape s = random_shape(random, pose, 1);
             const OverlapResult result = s.ask(tree, pose, {});
             // All leaves: what the shape may meet. Those whose ancestors it meets as well: what it surely does.

@@ -26,8 +26,10 @@ namespace {
 
 using reference::Matrix;
 using reference::Real;
+using reference::vector;
 using reference::Vector;
 using reference::operator*;
+using reference::operator+;
 using reference::operator-;
 using scenes::Point;
 using scenes::Random;
@@ -36,12 +38,6 @@ static_assert(noexcept(sweep(std::declval<TreeView>(), Motion{}, std::declval<Tr
                              std::declval<QueryContext&>())));
 static_assert(sizeof(Motion) == 16 * sizeof(float));
 
-Vector vector(const Vec3& v) {
-    return {v.x, v.y, v.z};
-}
-Vector operator+(const Vector& a, const Vector& b) {
-    return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
 Vector scaled(Real s, const Vector& v) {
     return {s * v[0], s * v[1], s * v[2]};
 }
