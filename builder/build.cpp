@@ -9,6 +9,7 @@
 #include "builder/hausdorff.hpp"
 #include "builder/hulls.hpp"
 #include "builder/job.hpp"
+#include "builder/mass.hpp"
 #include "builder/resolution.hpp"
 
 #include "src/format.hpp"
@@ -105,6 +106,7 @@ private:
                      .levels = std::move(figures),
                      .solid_volume = solid_.value,
                      .solid_volume_error = solid_.error,
+                     .mass = mass_,
                      .diagonal = box_.size().norm(),
                      .resolution = resolution_,
                      .surface_mode = !closed(),
@@ -128,14 +130,15 @@ private:
         return {};
     }
 
-    // Sets the solid's volume, unless it is too small to be one.
+    // Sets the solid's volume and mass properties, unless it is too small to be one.
     Columns measure_solid(const Winding& winding) {
         // A solid of less than this share of its diagonal's cube has no inside worth the name.
         constexpr double kNoInside = 1e-12;
         constexpr int kColumns = 512; // across
         Columns columns = measuring_columns(mesh_, closed(), winding, kColumns);
         const Quadrature solid = columns.volume();
-        if (solid.value > kNoInside * std::pow(box_.size().norm(), 3)) solid_ = solid;
+        if (solid.value > kNoInside * std::pow(box_.size().norm(), 3))
+            solid_ = solid, mass_ = mass_of(mesh_, closed(), columns);
         return columns;
     }
 
@@ -233,6 +236,7 @@ private:
         info.goal_reached = goal_reached;
         info.solid_volume = solid_.value;
         info.solid_volume_error = static_cast<float>(relative(solid_.error));
+        info.mass = mass_;
         info.diagonal = box_.size().norm();
         info.method = options_.method;
         info.primitive = options_.primitive;
@@ -341,6 +345,7 @@ private:
     Box box_;
     uint32_t resolution_ = 0;
     Quadrature solid_; // its volume; 0 where there is no inside
+    MassProperties mass_;
     format::Lattice lattice_;
     std::vector<double> surface_errors_; // of the grown nodes, as decoded
 };

@@ -72,7 +72,7 @@ class Sum {
 public:
     void add(int i, int j, double length) {
         part_[static_cast<size_t>(2 * (i & 1) + (j & 1))] += length;
-        longest_ = std::max(longest_, length);
+        longest_ = std::max(longest_, std::abs(length));
     }
     void add(const Sum& other) {
         for (size_t k = 0; k < 4; ++k) part_[k] += other.part_[k];
@@ -107,6 +107,31 @@ ColumnLattice measuring_lattice(const Box& box, int columns_across) {
     return lattice;
 }
 
+// Moments of intervals of columns.
+class MomentSums {
+public:
+    MomentSums(const ColumnLattice& lattice, const Vec& origin) : lattice_(lattice), origin_(origin) {}
+    void add(int i, int j, const Interval& interval, double weight) {
+        const Vec foot(lattice_.x0 + i * lattice_.dx, lattice_.y0 + j * lattice_.dy, 0);
+        const Vec p = lattice_.from_frame(foot) - origin_;
+        const double low = interval.low - origin_.z(), high = interval.high - origin_.z(), x = p.x(), y = p.y();
+        const double one = weight * (high - low), z = one * (low + high) / 2;
+        const double zz = one * (low * low + low * high + high * high) / 3;
+        const Monomials terms{one, x * one, y * one, z, x * x * one, y * y * one, zz, x * y * one, x * z, y * z};
+        for (size_t m = 0; m < kMonomials; ++m) sums_[m].add(i, j, terms[m]);
+    }
+    Moments total() const {
+        Moments out;
+        for (size_t m = 0; m < kMonomials; ++m) out[m] = sums_[m].times(lattice_.dx * lattice_.dy);
+        return out;
+    }
+
+private:
+    const ColumnLattice& lattice_;
+    const Vec origin_;
+    std::array<Sum, kMonomials> sums_;
+};
+
 } // namespace
 
 Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const ColumnLattice& lattice) : lattice_(lattice) {
@@ -122,7 +147,7 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
 
     std::vector<std::vector<Interval>> rows(static_cast<size_t>(lattice.nx));
     std::vector<size_t> interval_count(count + 1, 0);
-    std::vector<double> defects(static_cast<size_t>(lattice.nx));
+    std::vector<std::vector<Excess>> excesses(static_cast<size_t>(lattice.nx));
     parallel_for(0, lattice.nx, [&](int i) {
         std::vector<Interval>& row = rows[static_cast<size_t>(i)];
         for (int j = 0; j < lattice.ny; ++j) {
@@ -146,7 +171,8 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
                     number = winding(lattice.from_frame(middle));
                 }
                 if (std::abs(number) < 0.5) continue;
-                defects[static_cast<size_t>(i)] += (high - low) * std::abs(std::round(number) - 1);
+                if (const double excess = std::round(number) - 1; excess != 0)
+                    excesses[static_cast<size_t>(i)].push_back({i, j, {low, high}, excess});
                 if (row.size() > first && row.back().high == low)
                     row.back().high = high;
                 else
@@ -159,7 +185,9 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
     for (size_t c = 0; c < count; ++c) begin_[c + 1] = begin_[c] + interval_count[c + 1];
     intervals_.reserve(begin_[count]);
     for (const std::vector<Interval>& row : rows) intervals_.insert(intervals_.end(), row.begin(), row.end());
-    for (const double row : defects) defect_ += row * lattice.dx * lattice.dy; // in order: the same for any threads
+    for (const std::vector<Excess>& row : excesses) excess_.insert(excess_.end(), row.begin(), row.end());
+    for (const auto& [i, j, interval, weight] : excess_)
+        defect_ += (interval.high - interval.low) * std::abs(weight) * lattice.dx * lattice.dy;
 }
 
 Quadrature Columns::volume() const {
@@ -168,6 +196,20 @@ Quadrature Columns::volume() const {
         for (int j = 0; j < lattice_.ny; ++j)
             for (const Interval& s : column(i, j)) sum.add(i, j, s.high - s.low);
     return sum.times(lattice_.dx * lattice_.dy);
+}
+
+Moments Columns::moments(const Vec& origin) const {
+    MomentSums sums(lattice_, origin);
+    for (int i = 0; i < lattice_.nx; ++i)
+        for (int j = 0; j < lattice_.ny; ++j)
+            for (const Interval& s : column(i, j)) sums.add(i, j, s, 1);
+    return sums.total();
+}
+
+Moments Columns::excess(const Vec& origin) const {
+    MomentSums sums(lattice_, origin);
+    for (const auto& [i, j, interval, weight] : excess_) sums.add(i, j, interval, weight);
+    return sums.total();
 }
 
 Columns measuring_columns(MeshView mesh, bool closed, const Winding& winding, int columns_across) {

@@ -10,6 +10,7 @@
 
 #include <prolate/mesh.hpp>
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -40,6 +41,11 @@ struct Quadrature {
     double error = 0;
 };
 
+/// The polynomials whose integrals are mass properties: 1, x, y, z, x^2, y^2, z^2, x y, x z, y z.
+inline constexpr size_t kMonomials = 10;
+using Monomials = std::array<double, kMonomials>;
+using Moments = std::array<Quadrature, kMonomials>; ///< their integrals
+
 class Columns {
 public:
     /// Casts the columns. The solid is where |winding number| >= 1/2: an inverted shell is solid too. For a closed
@@ -58,11 +64,23 @@ public:
     /// winding number, cubic metres. Where it is 0, normals point outwards and nothing overlaps, so surface integrals
     /// give the solid's volumes. By these columns: what is thinner than their distance may go unseen.
     double winding_defect() const { return defect_; }
+    /// Integrals over the solid, of coordinates relative to `origin`.
+    Moments moments(const Vec& origin) const;
+    /// The same over (w - 1): how much more a surface integral counts than the solid.
+    Moments excess(const Vec& origin) const;
 
 private:
+    // An interval of a column in which the winding number is not 1.
+    struct Excess {
+        int i, j;
+        Interval interval;
+        double weight; // w - 1
+    };
+
     ColumnLattice lattice_;
     std::vector<size_t> begin_;
     std::vector<Interval> intervals_;
+    std::vector<Excess> excess_;
     double defect_ = 0;
 };
 

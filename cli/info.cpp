@@ -61,6 +61,17 @@ double weld_tolerance(const TreeView& tree) {
     return default_weld(largest);
 }
 
+// Volume, centre and tensor of the solid with density 1.
+std::string mass_text(const MassProperties& mass) {
+    const auto& [x, y, z] = mass.center;
+    const auto& [xx, yy, zz, xy, xz, yz] = mass.inertia;
+    return fmt::format("  mass      {:.9g} (+/- {:.0e}) at density 1, centre ({:.9g}, {:.9g}, {:.9g}) (+/- {:.0e})\n"
+                       "  inertia   about the centre, xx yy zz xy xz yz: {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} "
+                       "(+/- {:.0e})\n",
+                       mass.volume, mass.volume_error, x, y, z, mass.center_error, xx, yy, zz, xy, xz, yz,
+                       mass.inertia_error);
+}
+
 std::string as_text(const std::string& name, const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
     std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", visible(name), kFormatVersion,
@@ -82,6 +93,7 @@ std::string as_text(const std::string& name, const TreeView& tree) {
         out += fmt::format("  covers    {} of volume {:.6g} (+/- {:.0e}), diagonal {:.6g}\n",
                            info.exact ? "the surface of a solid" : "a solid", info.solid_volume,
                            info.solid_volume * double{info.solid_volume_error}, info.diagonal);
+    if (info.mass.volume > 0) out += mass_text(info.mass);
     if (const auto& [x, y, z] = info.placement.scale; info.placement.scale != Placement{}.scale)
         out += fmt::format("  scale     the mesh's file times {:g}, {:g}, {:g}\n", x, y, z);
     if (const auto& [x, y, z] = info.placement.origin; info.placement.origin != Placement{}.origin)

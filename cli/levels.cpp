@@ -116,6 +116,10 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["surface_mode"] = info.surface_mode;
     out["solid_volume"] = info.solid_volume;
     out["solid_volume_error"] = shortest(info.solid_volume * double{info.solid_volume_error});
+    const MassProperties& mass = info.mass;
+    out["mass"] = {{"volume", mass.volume},   {"volume_error", mass.volume_error},
+                   {"center", mass.center},   {"center_error", mass.center_error},
+                   {"inertia", mass.inertia}, {"inertia_error", mass.inertia_error}};
     out["diagonal"] = info.diagonal;
     out["scale"] = info.placement.scale;
     out["origin"] = info.placement.origin;

@@ -9,6 +9,8 @@
 #include <prolate/version.hpp>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cassert>
 #include <cstring>
 #include <iterator>
@@ -113,6 +115,8 @@ void store_header(std::byte* h, const BakeInfo& info, uint32_t degree, const Lat
         store_le(h + kAtMeshOrigin + 8 * i, info.placement.origin[i]);
     }
     store_le(h + kAtWeld, info.weld);
+    const auto mass = std::bit_cast<std::array<double, kMassNumbers>>(info.mass);
+    for (size_t i = 0; i < kMassNumbers; ++i) store_le(h + kAtMass + sizeof(double) * i, mass[i]);
 }
 
 // Writes the blocks level by level, and the rows of the table.

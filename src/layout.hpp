@@ -54,9 +54,14 @@ enum HeaderOffset : size_t {
     kAtMeshOrigin = 168,
     kAtWeld = 192,
     kAtReserved2 = 196,
-    kHeaderBytes = 200,
+    kAtMass = 200, // volume, center, inertia, errors: kMassNumbers doubles
+    kHeaderBytes = 304,
 };
 enum Flag : uint32_t { kSurfaceMode = 1, kExact = 2, kProved = 4, kGoalMissed = 8, kAllFlags = 15 };
+
+inline constexpr size_t kMassNumbers = 13, kMassErrors = 10; // the last three are errors
+static_assert(kAtMass + sizeof(double) * kMassNumbers == kHeaderBytes);
+static_assert(sizeof(MassProperties) == sizeof(double) * kMassNumbers);
 
 // A row of the levels table, which follows the header.
 enum LevelOffset : size_t {

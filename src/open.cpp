@@ -55,6 +55,16 @@ Result<void> check_triangle_counts(const std::byte* h, bool exact) {
     return {};
 }
 
+Result<void> check_mass(const std::byte* h) {
+    for (size_t i = 0; i < kMassNumbers; ++i) {
+        const size_t at = kAtMass + sizeof(double) * i;
+        const auto value = load_le<double>(h + at);
+        const bool of_any_sign = i > 0 && i < kMassErrors; // centre and tensor
+        if (!std::isfinite(value) || (value < 0 && !of_any_sign)) return bad("mass properties out of range", at);
+    }
+    return {};
+}
+
 // The header on its own: everything that does not need the nodes.
 Result<void> check_header(std::span<const std::byte> bytes) {
     const std::byte* h = bytes.data();
@@ -104,8 +114,8 @@ Result<void> check_header(std::span<const std::byte> bytes) {
             return bad("origin of the mesh out of range", kAtMeshOrigin + 8 * i);
     }
     if (!std::isfinite(load_le<float>(h + kAtWeld))) return bad("option out of range", kAtWeld);
-    if (!all_zero(h + kAtReserved2, kHeaderBytes - kAtReserved2))
-        return bad("reserved bytes are not zero", kAtReserved2);
+    if (!all_zero(h + kAtReserved2, kAtMass - kAtReserved2)) return bad("reserved bytes are not zero", kAtReserved2);
+    if (const auto mass = check_mass(h); !mass) return mass;
     return check_triangle_counts(h, (flags & kExact) != 0);
 }
 

@@ -5,6 +5,8 @@
 #include "src/format.hpp"
 #include "src/layout.hpp"
 
+#include <array>
+#include <bit>
 #include <cassert>
 
 namespace prolate {
@@ -67,6 +69,8 @@ BakeInfo TreeView::bake_info() const noexcept {
         placement.scale[i] = load_le<double>(h + kAtScale + 8 * i);
         placement.origin[i] = load_le<double>(h + kAtMeshOrigin + 8 * i);
     }
+    std::array<double, kMassNumbers> mass;
+    for (size_t i = 0; i < kMassNumbers; ++i) mass[i] = load_le<double>(h + kAtMass + sizeof(double) * i);
     return {.source_hash = load_le<uint64_t>(h + kAtSourceHash),
             .options_hash = load_le<uint64_t>(h + kAtOptionsHash),
             .surface_mode = surface_mode(),
@@ -75,6 +79,7 @@ BakeInfo TreeView::bake_info() const noexcept {
             .goal_reached = (load_le<uint32_t>(h + kAtFlags) & kGoalMissed) == 0,
             .solid_volume = load_le<double>(h + kAtSolidVolume),
             .solid_volume_error = load_le<float>(h + kAtSolidVolumeError),
+            .mass = std::bit_cast<MassProperties>(mass),
             .diagonal = load_le<double>(h + kAtDiagonal),
             .method = static_cast<Method>(load_le<uint8_t>(h + kAtMethod)),
             .primitive = static_cast<Primitive>(load_le<uint8_t>(h + kAtPrimitive)),

@@ -4,6 +4,7 @@
 // IEEE International Conference on Computer-Aided Design and Computer Graphics, 2009.
 #pragma once
 
+#include <prolate/mass.hpp>
 #include <prolate/types.hpp>
 
 #include <cstdint>
@@ -20,14 +21,17 @@ enum class Quality : uint8_t { fast = 0, normal = 1, best = 2 };
 
 /// How a tree was baked, as its file tells. "Asked" is what BuildOptions asked for; 0 = not asked.
 struct BakeInfo {
-    uint64_t source_hash = 0;     ///< hash(MeshView) of the cleaned mesh
-    uint64_t options_hash = 0;    ///< hash of the options and of the builder's version, see hash(BuildOptions)
-    bool surface_mode = false;    ///< the mesh was open: only its triangles are certain to be covered
-    bool exact = false;           ///< an exact tree: the triangles are stored, and the nodes cover only them
-    bool proved = false;          ///< every level was proved to cover, after quantisation, before the file was written
-    bool goal_reached = true;     ///< false: the asked count, tolerance or distance could not be met
-    double solid_volume = 0;      ///< cubic metres; 0 where there is no inside, and of exact trees of open meshes
+    uint64_t source_hash = 0;  ///< hash(MeshView) of the cleaned mesh
+    uint64_t options_hash = 0; ///< hash of the options and of the builder's version, see hash(BuildOptions)
+    bool surface_mode = false; ///< the mesh was open: only its triangles are certain to be covered
+    bool exact = false;        ///< an exact tree: the triangles are stored, and the nodes cover only them
+    bool proved = false;       ///< every level was proved to cover, after quantisation, before the file was written
+    bool goal_reached = true;  ///< false: the asked count, tolerance or distance could not be met
+    /// Cubic metres, by the columns that all ratios are measured with; mass.volume is more exact. 0 where there is no
+    /// inside, and of exact trees of open meshes.
+    double solid_volume = 0;
     float solid_volume_error = 0; ///< relative; estimated as LevelFigures::outside_ratio_error is
+    MassProperties mass;          ///< of the solid, with density 1
     double diagonal = 0;          ///< of the mesh's bounding box, metres
     Method method = Method::voxel;
     Primitive primitive = Primitive::ellipsoid;

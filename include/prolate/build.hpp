@@ -81,6 +81,7 @@ struct Build {
     std::vector<LevelReport> levels; ///< the root first
     double solid_volume = 0;         ///< cubic metres; 0 where there is no inside, and of exact trees of open meshes
     double solid_volume_error = 0;   ///< cubic metres; estimated as LevelFigures::outside_ratio_error is
+    MassProperties mass;             ///< of the solid, with density 1
     double diagonal = 0;             ///< of the mesh's bounding box, metres
     uint32_t resolution = 0;         ///< voxels along the box's longest side
     bool surface_mode = false;       ///< the mesh is open: see build()

@@ -41,8 +41,8 @@ using scenes::Random;
 using Bytes = std::vector<std::byte>;
 
 constexpr OpenOptions kNoHash{.check_hash = false};
-constexpr size_t kTable = 200, kRow = 60;
-constexpr size_t kBounding = 384;               // of the golden tree: 200 + 3 * 60 and zeros up to a multiple of 64
+constexpr size_t kTable = 304, kRow = 60;
+constexpr size_t kBounding = 512;               // of the golden tree: 304 + 3 * 60 and zeros up to a multiple of 64
 constexpr size_t kBlocks = kBounding + 2 * 256; // of the exact one, which has no bounding blocks, kBounding
 constexpr size_t kBlock1 = kBlocks + 256, kBlock2 = kBlock1 + 256, kEnd = kBlock2 + 256, kGoldenBlocks = 3;
 constexpr size_t kExactBlock1 = kBounding + 256, kExactBlock2 = kExactBlock1 + 256, kExactEnd = kExactBlock2 + 256;
@@ -86,6 +86,7 @@ BakeInfo golden_info() {
             .goal_reached = false,
             .solid_volume = 12.5,
             .solid_volume_error = 0.03125f,
+            .mass = {12.25, {1, -2, 3}, {4, 5, 6, -0.5, 0.25, -0.125}, 0.0625, 0.03125, 0.015625},
             .diagonal = 17.25,
             .method = Method::analytic,
             .primitive = Primitive::ellipsoid,
@@ -219,7 +220,7 @@ void expect_sound(const TreeView& tree) {
 }
 
 TEST(Format, GoldenExactFileOfVersionSix) {
-    const Bytes file = golden_file("golden_v6_exact.etree", golden_exact());
+    const Bytes file = golden_file("golden_v7_exact.etree", golden_exact());
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
@@ -252,7 +253,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
         info.exact = true;
         PackedLevel root{{{.triangle_count = 1}}};
         const Bytes bytes = format::encode(info, 8, {}, std::span(&root, 1), {vertices, std::span(&triangle, 1), 1});
-        EXPECT_EQ(bytes.size(), 320 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
+        EXPECT_EQ(bytes.size(), 384 + 256 + 64 + 8 + 12 * count + (count > 65536 ? 12 : 6));
         const auto tree = TreeView::open(bytes);
         ASSERT_TRUE(tree) << tree.error().what;
         EXPECT_EQ(tree->triangle(0), triangle);
@@ -261,7 +262,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
 }
 
 TEST(Format, GoldenFileOfVersionSix) {
-    const Bytes file = golden_file("golden_v6.etree", golden());
+    const Bytes file = golden_file("golden_v7.etree", golden());
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -322,6 +323,7 @@ TEST(Format, GoldenFileOfVersionSix) {
     EXPECT_EQ(info.solid_volume_error, expected.solid_volume_error);
     EXPECT_EQ(info.placement, expected.placement);
     EXPECT_EQ(info.weld, expected.weld);
+    EXPECT_EQ(info.mass, expected.mass);
     EXPECT_EQ(info.diagonal, expected.diagonal);
     EXPECT_EQ(info.method, expected.method);
     EXPECT_EQ(info.quality, expected.quality);
@@ -420,7 +422,7 @@ TEST(Format, CentersTakeTheBitsThatAFloatHolds) {
             if (fits) {
                 EXPECT_EQ(tree->view().ellipsoid(0).center.x, x);
             } else {
-                EXPECT_EQ(tree.error().where, 320u + 160);
+                EXPECT_EQ(tree.error().where, 384u + 160);
                 EXPECT_STREQ(tree.error().what,
                              q == 65535 ? "a center lies beyond the lattice" : "a center has more bits than a float");
             }
@@ -452,9 +454,9 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    for (const char* name :
-         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree",
-          "golden_v4.etree", "golden_v4_exact.etree", "golden_v5.etree", "golden_v5_exact.etree"}) {
+    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree",
+                             "golden_v3_exact.etree", "golden_v4.etree", "golden_v4_exact.etree", "golden_v5.etree",
+                             "golden_v5_exact.etree", "golden_v6.etree", "golden_v6_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -560,12 +562,12 @@ TEST(Format, NamesTheFirstOffence) {
         {kBlocks + 144, {18}, ErrorCode::bad_file, kBlocks + 144},         // 22 above the step exponent, -4
         {kBlocks + 144, {0xdd}, ErrorCode::bad_file, kBlocks + 144},       // 31 below
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
-        {8, {7}, ErrorCode::newer_version, 7},
+        {8, {8}, ErrorCode::newer_version, 8},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
         {12, {16}, ErrorCode::bad_file, 12}, // unknown flag
-        {16, {0}, ErrorCode::bad_file, 16},  // total size
+        {16, {1}, ErrorCode::bad_file, 16},  // total size
         {48, {7}, ErrorCode::bad_file, 48},  // node count
         {52, {0}, ErrorCode::bad_file, 52},  // no level
         {52, {33}, ErrorCode::bad_file, 52}, // too many levels
@@ -596,13 +598,17 @@ TEST(Format, NamesTheFirstOffence) {
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
         {kTable + kRow + 4, {9}, ErrorCode::bad_file, kTable + kRow + 4}, // more nodes than lanes
-        {kTable + 8, {0}, ErrorCode::bad_file, kTable + 8},
-        {kTable + 8, {0x80, 5}, ErrorCode::bad_file, kTable + 8},               // two blocks of roots
+        {kTable + 8, {1}, ErrorCode::bad_file, kTable + 8},
+        {kTable + 8, {0, 6}, ErrorCode::bad_file, kTable + 8},                  // two blocks of roots
         {kTable + kRow + 8, {0x81, 5}, ErrorCode::bad_file, kTable + kRow + 8}, // no whole number of blocks
         {kTable + kRow + 8, {0x80, 4}, ErrorCode::bad_file, kTable + kRow + 8}, // no block
         {kTable + 31, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative union volume
         {kTable + 35, {0xc0}, ErrorCode::bad_file, kTable + 24},                // negative outside ratio
         {kTable + 56, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, kTable + 24},    // infinite distance
+        {207, {0xc0}, ErrorCode::bad_file, 200},                                // mass: a negative volume
+        {214, {0xf0, 0x7f}, ErrorCode::bad_file, 208},                          // an infinite centre
+        {278, {0xf8, 0x7f}, ErrorCode::bad_file, 272},                          // inertia that is no number
+        {303, {0x80}, ErrorCode::bad_file, 296},                                // a negative error
         {kBounding - 4, {1}, ErrorCode::bad_file, kBounding - 4},               // padding
         {kBounding - 1, {1}, ErrorCode::bad_file, kBounding - 1},
         {kBounding + 152, {3}, ErrorCode::bad_file, kBounding + 152}, // other children than in the block
@@ -883,7 +889,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 6); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 7); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

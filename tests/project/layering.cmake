@@ -11,7 +11,7 @@ cmake_minimum_required(VERSION 3.25)
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
 set(layers include/prolate src query builder viewer cli)
-set(core_headers "types|error|bake_info|detail/tree_bytes|tree|matrix|version")
+set(core_headers "types|error|mass|bake_info|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
 set(include/prolate_headers ".*")
@@ -22,7 +22,7 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|pairs|poses|bounds|jobs|world|tools|glm")
+set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|points|pairs|poses|bounds|jobs|world|tools|glm")
 set(query_folders "src|query")
 set(query_libraries "glm/.*|hwy/.*")
 # Inside query/: each folder may include itself and these, so queries do not know each other.
@@ -32,7 +32,7 @@ set(query/ellipsoid_knows "simd")
 set(query/triangle_knows "simd ellipsoid")
 set(query/node_knows "simd ellipsoid")
 set(query/inside_knows "simd ellipsoid triangle node")
-foreach(folder collide distance sweep raycast shapes)
+foreach(folder collide distance sweep raycast shapes points)
   set(query/${folder}_knows "${query_geometry}")
 endforeach()
 set(query/contacts_knows "${query_geometry} collide")
