@@ -10,7 +10,7 @@ cmake_minimum_required(VERSION 3.25)
 
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
-set(layers include/prolate src query builder viewer cli)
+set(layers include/prolate src query builder viewer cli python)
 set(core_headers "types|error|mass|bake_info|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
@@ -51,6 +51,10 @@ set(cli_folders "src|builder|query|cli")
 set(cli_libraries
   "CLI/.*|fmt/.*|nlohmann/.*|png\\.h|embree3/.*|glm/.*|tbb/.*|oneapi/tbb/.*|freetype/.*|fontconfig/.*|${posix}")
 
+set(python_headers ".*")
+set(python_folders "python")
+set(python_libraries "nanobind/.*|oneapi/tbb/.*")
+
 # Single files that may have one library more: the gateways.
 set(extra_include/prolate/eigen.hpp "Eigen/.*")
 set(extra_include/prolate/glm.hpp "glm/.*")
@@ -67,7 +71,7 @@ function(allowed out file layer form target)
   elseif(target MATCHES "^prolate/(.*)\\.hpp$")
     set(pattern "${${layer}_headers}")
     set(subject "${CMAKE_MATCH_1}")
-  elseif(target MATCHES "^(src|query|builder|viewer|cli|tests|bench|examples)/")
+  elseif(target MATCHES "^(src|query|builder|viewer|cli|python|tests|bench|examples)/")
     set(pattern "${${layer}_folders}")
     set(subject "${CMAKE_MATCH_1}")
   elseif(form STREQUAL "<" AND target MATCHES "^[a-z_0-9]+$")

@@ -7,7 +7,7 @@
 # tests/project/pointers_selftest.cmake plants offences to show that this check finds them.
 cmake_minimum_required(VERSION 3.25)
 
-set(folders src include query builder viewer cli tests bench examples docs findings cmake)
+set(folders src include query builder viewer cli python tests bench examples docs findings cmake)
 file(GLOB files RELATIVE "${ROOT}" "${ROOT}/*.md" "${ROOT}/*.txt" "${ROOT}/run")
 foreach(folder IN LISTS folders)
   file(GLOB_RECURSE found RELATIVE "${ROOT}" "${ROOT}/${folder}/*")

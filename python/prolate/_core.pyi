@@ -1,0 +1,141 @@
+# The C++ side (python/src). It checks its arguments itself, so most of them are plain objects here.
+from collections.abc import Callable
+from typing import Any, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+LIBRARY_VERSION: int
+FORMAT_VERSION: int
+BUILDER_VERSION: int
+
+_Floats = NDArray[np.float64]
+_Bytes = NDArray[np.uint8]
+_Index = NDArray[np.int64]
+_Progress = Optional[Callable[[str, float, int], object]]
+_Placement = Optional[tuple[tuple[float, float, float], tuple[float, float, float]]]
+_PairArrays = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Bytes]
+
+class Tree:
+    def __init__(self, buffer: object, check_hash: bool) -> None: ...
+    @property
+    def buffer(self) -> _Bytes: ...
+    @property
+    def level_count(self) -> int: ...
+    @property
+    def node_count(self) -> int: ...
+    @property
+    def has_triangles(self) -> bool: ...
+    def level_end(self, level: int) -> int: ...
+    def info_dict(self) -> dict[str, Any]: ...
+    def cut_arrays(self, level: object) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Index, _Index]: ...
+    def mesh_arrays(self) -> tuple[NDArray[np.float32], NDArray[np.uint32]]: ...
+
+class World:
+    def __init__(self, slack: object) -> None: ...
+    def __len__(self) -> int: ...
+    def insert(
+        self, tree: object, pose: object, margin: object, layers: object, mask: object, wxyz: bool, /
+    ) -> int: ...
+    def remove(self, id: object, /) -> None: ...
+    def move(self, ids: object, poses: object, wxyz: bool, /) -> None: ...
+    def pairs(self) -> tuple[NDArray[np.uint64], NDArray[np.bool_]]: ...
+    def collide(self, margin: object, threads: object, /) -> tuple[NDArray[np.uint64], _Bytes]: ...
+
+def bake(
+    vertices: object, faces: object, placement: _Placement, options: dict[str, object], progress: _Progress
+) -> tuple[_Bytes, dict[str, Any]]: ...
+def bake_key(vertices: object, faces: object, placement: _Placement, options: dict[str, object]) -> tuple[int, int]: ...
+def options_hash(options: dict[str, object]) -> int: ...
+def verify(
+    tree: object, vertices: object, faces: object, placement: _Placement, threads: object, progress: _Progress
+) -> dict[str, Any]: ...
+def load_mesh(
+    path: str, unit: object, scale: object, recentre: bool
+) -> tuple[
+    NDArray[np.float32],
+    NDArray[np.uint32],
+    tuple[tuple[float, float, float], tuple[float, float, float]],
+    list[str],
+    list[str],
+]: ...
+def mesh_file_hash(path: str, unit: object, scale: object, recentre: bool) -> Optional[int]: ...
+def save(path: str, tree: Tree, /) -> None: ...
+def collide(
+    a: object,
+    poses_a: object,
+    b: object,
+    poses_b: object,
+    margin: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    out: object,
+    wxyz: bool,
+) -> int | _Bytes: ...
+def distance(
+    a: object,
+    poses_a: object,
+    b: object,
+    poses_b: object,
+    tolerance: object,
+    max_distance: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    wxyz: bool,
+) -> tuple[_PairArrays, bool]: ...
+def sweep(
+    a: object,
+    start_a: object,
+    end_a: object,
+    b: object,
+    start_b: object,
+    end_b: object,
+    margin: object,
+    tolerance: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    wxyz: bool,
+) -> tuple[_PairArrays, _Floats, bool]: ...
+def raycast(
+    tree: object,
+    pose: object,
+    origins: object,
+    directions: object,
+    radius: object,
+    max_t: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    wxyz: bool,
+) -> tuple[tuple[_Floats, _Floats, _Floats, _Index, _Index, _Bytes], bool]: ...
+def overlap(
+    tree: object,
+    poses: object,
+    kind: str,
+    numbers: object,
+    margin: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    out: object,
+    wxyz: bool,
+) -> int | _Bytes: ...
+def bounds(tree: object, poses: object, margin: object, wxyz: bool) -> tuple[_Floats, _Floats, bool]: ...
+def contacts(
+    a: object,
+    poses_a: object,
+    b: object,
+    poses_b: object,
+    margin: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    wxyz: bool,
+) -> tuple[tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, NDArray[np.uint64]], _Bytes]: ...
+def pairs_collide(radii: object, poses: object, pairs: object, margin: object, wxyz: bool) -> _Bytes: ...
+def pairs_distance(
+    radii: object, poses: object, pairs: object, tolerance: object, wxyz: bool
+) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats]: ...

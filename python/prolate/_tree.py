@@ -1,0 +1,510 @@
+"""Ellipsoid trees."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional, Union
+
+from . import _core
+from ._errors import Error
+from ._mesh import Mesh, arrays_of, placed
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+Progress = Optional[Callable[[str, float, int], object]]
+
+
+class Ellipsoids(NamedTuple):
+    """The N ellipsoids of a cut; read-only arrays.
+
+    Every cut covers the solid. Read in double precision, each ellipsoid of ``center``, ``radii`` and ``rotation`` holds
+    the tree's own, of which ``center`` and ``factor`` are exact.
+
+    Attributes
+    ----------
+    center : float64 (N, 3)
+        Metres.
+    radii : float64 (N, 3)
+        Semi-axes, largest first, metres.
+    rotation : float64 (N, 3, 3)
+        Column i is the direction of radius i.
+    quaternion : float64 (N, 4)
+        The same rotation, ``x y z w``.
+    factor : float64 (N, 3, 3)
+        The lower triangular L of {center + L u : \\|u\\| <= 1}.
+    node, parent : int64 (N,)
+        The node's slot in the tree, and its parent's; -1 for the root.
+    """
+
+    center: NDArray[np.float64]
+    radii: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+    quaternion: NDArray[np.float64]
+    factor: NDArray[np.float64]
+    node: NDArray[np.int64]
+    parent: NDArray[np.int64]
+
+
+class LevelInfo(NamedTuple):
+    """One level of a tree, as measured when it was baked. Lengths in metres; NaN where unknown.
+
+    Attributes
+    ----------
+    ellipsoids : int
+        Of the cut: the nodes of the level, and the leaves above it.
+    nodes : int
+    bytes : int
+        Size of the file up to the end of this level, a coarser tree.
+    outside_ratio, outside_ratio_error : float
+        Volume of (cut less solid) / volume of the solid, and the estimated error of that.
+    union_volume : float
+        Cubic metres.
+    hausdorff_max, hausdorff_mean, hausdorff_p99 : float
+        How far the cover sticks out of the solid: at most (an upper bound), on average, and of 99 % of its surface.
+    """
+
+    ellipsoids: int
+    nodes: int
+    bytes: int
+    outside_ratio: float
+    outside_ratio_error: float
+    union_volume: float
+    hausdorff_max: float
+    hausdorff_mean: float
+    hausdorff_p99: float
+
+
+class Diagnosis(NamedTuple):
+    """What the bake found in a mesh, and did about it: counts, lengths in metres."""
+
+    input_vertices: int
+    input_triangles: int
+    merged_vertices: int
+    unused_vertices: int
+    welded_vertices: int
+    weld_distance: float
+    degenerate_triangles: int
+    open_edges: int
+    non_manifold_edges: int
+    closed: bool
+    turned_shells: int
+    size: tuple[float, float, float]
+
+
+class TreeInfo(NamedTuple):
+    """What a tree says of itself.
+
+    Attributes
+    ----------
+    levels : tuple of LevelInfo
+        The root first.
+    exact : bool
+        The leaves hold the mesh's triangles, and queries answer for these.
+    proved : bool
+        Every level was proved to cover before the tree was stored.
+    surface_mode : bool
+        The mesh was open: only its triangles are certain to be covered.
+    goal_reached : bool
+        False: the asked number, tolerance or distance could not be met.
+    volume, volume_error : float
+        Of the solid, cubic metres; 0 where there is no inside.
+    diagonal : float
+        Of the mesh's box, metres.
+    scale, origin : tuple of 3 floats
+        Answers are relative to ``origin``: mesh = scale * file - origin.
+    bytes, degree, node_count, triangle_count, vertex_count, is_prefix, primitive, quality, method, seed, resolution
+        How large it is and how it was baked.
+    source_hash, options_hash : int
+        The key of a cache of bakes.
+    diagnosis : Diagnosis or None
+        Of the mesh; known of trees that this process, or one that it was pickled by, has baked.
+    """
+
+    levels: tuple[LevelInfo, ...]
+    exact: bool
+    proved: bool
+    surface_mode: bool
+    goal_reached: bool
+    volume: float
+    volume_error: float
+    diagonal: float
+    scale: tuple[float, float, float]
+    origin: tuple[float, float, float]
+    bytes: int
+    degree: int
+    node_count: int
+    triangle_count: int
+    vertex_count: int
+    is_prefix: bool
+    primitive: str
+    quality: str
+    method: str
+    seed: int
+    resolution: int
+    source_hash: int
+    options_hash: int
+    diagnosis: Diagnosis | None
+
+
+class LevelProof(NamedTuple):
+    """Verdict on one level: ``covered``, or a ``counterexample`` (a point of the solid in no ellipsoid, ``depth`` away
+    in radii), or neither if the subdivision gave up. ``pieces`` of the solid were looked at."""
+
+    covered: bool
+    counterexample: tuple[float, float, float] | None
+    depth: float
+    pieces: int
+
+
+class Proof(NamedTuple):
+    """Answer of :meth:`Tree.verify`; true if ``covered``.
+
+    Attributes
+    ----------
+    covered : bool
+        Every level covers, and the bounding volumes hold what is below them.
+    same_mesh : bool
+        Of an exact tree: its triangles are the mesh's.
+    bounded : bool
+        The bounding volumes hold what is below them.
+    surface_mode : bool
+        The mesh is open, so the proof is about its triangles.
+    levels : tuple of LevelProof
+    """
+
+    covered: bool
+    same_mesh: bool
+    bounded: bool
+    surface_mode: bool
+    levels: tuple[LevelProof, ...]
+
+    def __bool__(self) -> bool:
+        return self.covered
+
+
+class Tree(_core.Tree):
+    """An ellipsoid tree: a hierarchy of ellipsoids, each level of which covers a solid.
+
+    :func:`bake`, :func:`load` and :meth:`from_bytes` make trees. A tree is immutable, may be shared by threads, pickled
+    and copied, and equals a tree of the same bytes.
+    """
+
+    __slots__ = ("_diagnosis", "_hash")
+    _diagnosis: dict[str, Any] | None
+    _hash: int | None
+
+    def __init__(self, buffer: object, check_hash: bool = True) -> None:
+        super().__init__(_bytes_of(buffer), check_hash)
+        self._diagnosis = None
+        self._hash = None
+
+    @classmethod
+    def from_bytes(cls, buffer: object, *, check_hash: bool = True) -> Tree:
+        """A tree over the bytes of an ``.etree`` file.
+
+        Parameters
+        ----------
+        buffer : bytes-like
+            Read where it lies, and kept alive, if it is read-only: ``bytes``, a read-only ``memoryview``, or
+            ``mmap.mmap(..., access=mmap.ACCESS_READ)``, under which the file must not be cut short. What can be written
+            to is copied first. A prefix of a file that ends where a level ends is a coarser tree.
+        check_hash : bool
+            Compare the content's hash, which finds every accidental change. Without, queries are still safe.
+
+        Raises
+        ------
+        Error
+            ``code`` is ``"bad_file"`` or ``"newer_version"``, ``where`` the byte of the first offence.
+        TypeError, ValueError
+            For what holds no bytes.
+        """
+        return cls(buffer, check_hash)
+
+    # ---- bytes ----
+
+    def __bytes__(self) -> bytes:
+        return self.buffer.tobytes()
+
+    def save(self, path: Union[str, os.PathLike[str]]) -> None:
+        """Write the ``.etree`` file. An interruption leaves the old file or the new one, never a part.
+
+        Raises
+        ------
+        Error
+            ``code`` is ``"io"``, ``where`` the ``errno``.
+        """
+        _core.save(os.fsdecode(path), self)
+
+    def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
+        import pickle
+
+        data = pickle.PickleBuffer(self.buffer.data) if protocol >= 5 else bytes(self)
+        return _restored, (data, self._diagnosis)
+
+    def __copy__(self) -> Tree:
+        return self
+
+    def __deepcopy__(self, memo: object) -> Tree:
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Tree):
+            return NotImplemented
+        return self is other or self.buffer.data == other.buffer.data
+
+    def __hash__(self) -> int:
+        if self._hash is None:
+            known = self.info_dict()
+            self._hash = hash((known["bytes"], known["source_hash"], known["options_hash"]))
+        return self._hash
+
+    # ---- contents ----
+
+    @property
+    def info(self) -> TreeInfo:
+        """What the tree says of itself: levels, closeness, volume, proof, how it was baked."""
+        known = self.info_dict()
+        levels = tuple(LevelInfo(**level) for level in known.pop("levels"))
+        diagnosis = None if self._diagnosis is None else Diagnosis(**self._diagnosis)
+        return TreeInfo(levels=levels, diagnosis=diagnosis, **known)
+
+    def cut(self, level: int = -1) -> Ellipsoids:
+        """The ellipsoids of a level, and of the leaves above it.
+
+        Parameters
+        ----------
+        level : int
+            0 is the root; negative ones count from the last, -1.
+
+        Raises
+        ------
+        ValueError
+            There is no such level.
+        """
+        return Ellipsoids(*self.cut_arrays(level))
+
+    def prefix(self, level: int) -> Tree:
+        """The coarser tree that ends with ``level``, over the same bytes. Of an exact tree it has no triangles."""
+        return Tree(self.buffer[: self.level_end(level)])
+
+    @property
+    def mesh(self) -> Mesh | None:
+        """The triangles of an exact tree; None of others."""
+        if not self.has_triangles:
+            return None
+        known = self.info_dict()
+        return Mesh(*self.mesh_arrays(), scale=known["scale"], origin=known["origin"])
+
+    def verify(self, mesh: Any, faces: Any = None, *, threads: int = 0, progress: Progress = None) -> Proof:
+        """Prove that each level covers a mesh, from the tree's bytes and the mesh alone.
+
+        Parameters
+        ----------
+        mesh : array (V, 3), or a mesh object
+            The vertices, as they were given to :func:`bake`: they are scaled and moved as the tree remembers. Or what
+            :func:`load_mesh` or :func:`bake_mesh` know; what ``load_mesh`` has read is taken as it is.
+        faces : integer array (F, 3), optional
+            With vertices.
+        threads : int
+            0 = all cores.
+        progress : callable, optional
+            As in :func:`bake`.
+
+        Returns
+        -------
+        Proof
+
+        Raises
+        ------
+        Error, ValueError, TypeError
+            For a mesh that cannot be a solid or surface.
+        """
+        as_read = isinstance(mesh, Mesh)
+        vertices, triangles = (mesh, faces) if faces is not None else arrays_of(mesh)
+        if not as_read:
+            known = self.info_dict()
+            origin = known["origin"] if any(known["origin"]) else False
+            vertices, triangles, _ = placed(vertices, triangles, known["scale"], origin)
+        report = _core.verify(self, vertices, triangles, None, threads, progress)
+        report["levels"] = tuple(LevelProof(**level) for level in report["levels"])
+        return Proof(**report)
+
+    # ---- pictures and exports, by the command that comes with the package ----
+
+    def export(
+        self,
+        path: Union[str, os.PathLike[str]],
+        *,
+        level: int | None = None,
+        segments: int = 32,
+        outer: bool | None = None,
+    ) -> None:
+        """Write the ellipsoids for other programs.
+
+        Parameters
+        ----------
+        path : path-like
+            Ends in ``.csv``, ``.json`` (full precision), ``.ply``, ``.obj`` (meshes), ``.glb`` (glTF) or ``.pov``. A
+            file that prolate did not write is not replaced.
+        level : int, optional
+            The cut at this level; negative ones count from the last. By default as ``prolate export --help`` says.
+        segments : int
+            Of meshes: 4 ... 256 along each section.
+        outer : bool, optional
+            Of meshes: triangles outside the ellipsoids, which then cover (``.ply`` and ``.obj`` by default), or corners
+            on them.
+
+        Raises
+        ------
+        Error
+        """
+        from . import _command
+
+        options = ["-o", os.fspath(path), "--segments", str(segments)]
+        if level is not None:
+            options += ["--level", str(level + self.level_count if level < 0 else level)]
+        if outer is not None:
+            options += ["--outer" if outer else "--no-outer"]
+        _command.run_on(self, "export", [], options)
+
+    def render(
+        self,
+        mesh: Any = None,
+        *,
+        levels: list[int] | None = None,
+        size: tuple[int, int] = (1600, 1200),
+        view: tuple[float, float] | None = None,
+        up: str | None = None,
+        heat: bool = False,
+        section: str | None = None,
+        style: str = "beside",
+        samples: int | None = None,
+    ) -> NDArray[np.uint8]:
+        """A picture of the tree, level by level; needs Pillow.
+
+        Parameters
+        ----------
+        mesh : path, or what :func:`bake_mesh` takes, optional
+            The mesh that the tree covers, to be shown as well.
+        levels : list of int, optional
+            By default 1, 2 and 3.
+        size : (int, int)
+            Width and height, pixels.
+        view : (float, float), optional
+            Azimuth and elevation of the viewer, degrees.
+        up : {"x", "y", "z"}, optional
+            The axis that points up.
+        heat : bool
+            Colour by how far the tree sticks out of the mesh.
+        section : str, optional
+            ``"z"`` or ``"z,0.4"``: cut open across an axis.
+        style : {"beside", "overlay", "none"}
+            Where the mesh is.
+        samples : int, optional
+            Light samples a pixel, 16 ... 1024.
+
+        Returns
+        -------
+        uint8 array (height, width, 3)
+
+        Raises
+        ------
+        Error
+        """
+        from . import _command
+
+        options = ["--size", f"{size[0]}x{size[1]}", "--mesh", style if mesh is not None else "none"]
+        if levels is not None:
+            options += ["--levels", ",".join(str(level) for level in levels)]
+        if view is not None:
+            options += ["--view", f"{view[0]},{view[1]}"]
+        for name, value in (("--up", up), ("--section", section), ("--samples", samples)):
+            if value is not None:
+                options += [name, str(value)]
+        if heat:
+            options.append("--heat")
+        return _command.picture(self, mesh, options)
+
+    def view(self, mesh: Any = None) -> str:
+        """A page of HTML that shows the tree, and the mesh, in a browser, offline. ``mesh`` is as in :meth:`render`."""
+        from . import _command
+
+        return _command.page(self, mesh)
+
+    def _repr_html_(self) -> str:
+        try:
+            page = self.view()
+        except Error as error:
+            return f"<pre>{self!r}\n{error}</pre>"
+        escaped = page.replace("&", "&amp;").replace('"', "&quot;")
+        style = "width:100%;height:480px;border:0"
+        return f'<iframe srcdoc="{escaped}" style="{style}" sandbox="allow-scripts"></iframe>'
+
+    def __repr__(self) -> str:
+        known = self.info_dict()
+        last = known["levels"][-1]
+        kind = (
+            "exact, " + f"{known['triangle_count']} triangles"
+            if self.has_triangles
+            else f"{last['ellipsoids']} {known['primitive']}s"
+        )
+        ratio = last["outside_ratio"]
+        close = "" if self.has_triangles or ratio != ratio else f", outside ratio {ratio:.3g}"
+        proved = "proved" if known["proved"] else "not proved"
+        return f"<prolate.Tree: {kind}, {self.level_count} levels{close}, {proved}, {known['bytes']} bytes>"
+
+
+def load(path: Union[str, os.PathLike[str]], *, check_hash: bool = True) -> Tree:
+    """Read an ``.etree`` file into memory and check it.
+
+    Parameters
+    ----------
+    path : path-like
+    check_hash : bool
+        As for :meth:`Tree.from_bytes`, which also takes a mapped file.
+
+    Raises
+    ------
+    Error
+        ``code`` is ``"io"``, ``"bad_file"`` or ``"newer_version"``.
+    """
+    name = os.fsdecode(path)
+    try:
+        with open(name, "rb") as file:
+            data = file.read()
+    except OSError as error:
+        raise Error(f"{error.strerror}: {name}", "io", error.errno or 0) from None
+    try:
+        return Tree.from_bytes(data, check_hash=check_hash)
+    except Error as error:
+        raise Error(f"{error}: {name}", error.code, error.where) from None
+
+
+def baked_tree(data: object, diagnosis: dict[str, Any] | None) -> Tree:
+    """The tree of bytes that were just made."""
+    tree = Tree(data, check_hash=False)
+    tree._diagnosis = diagnosis
+    return tree
+
+
+def _restored(data: object, diagnosis: dict[str, Any] | None) -> Tree:
+    tree = Tree(data)
+    tree._diagnosis = diagnosis
+    return tree
+
+
+def _bytes_of(buffer: object) -> NDArray[np.uint8]:
+    """The bytes as an array that nobody can write to."""
+    import numpy as np
+
+    try:
+        view = memoryview(buffer)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"buffer: must be bytes-like, not {type(buffer).__name__}") from None
+    if not view.contiguous:
+        raise ValueError("buffer: must be contiguous")
+    data = np.frombuffer(view, dtype=np.uint8) if view.nbytes > 0 else np.empty(0, np.uint8)
+    return data if view.readonly else data.copy()

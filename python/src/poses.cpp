@@ -1,0 +1,216 @@
+#include "python/src/poses.hpp"
+
+#include <prolate/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace prolate::python {
+namespace {
+
+static_assert(sizeof(Pose) == 7 * sizeof(float) && sizeof(DoublePose) == 7 * sizeof(double));
+
+constexpr double kMost = std::numeric_limits<float>::max();
+
+using Quaternion = std::array<double, 4>;
+
+Quaternion unit(const double (&q)[4]) noexcept {
+    const double most = std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2]), std::abs(q[3])});
+    const Quaternion s = {q[0] / most, q[1] / most, q[2] / most, q[3] / most};
+    const double length = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3]);
+    return {s[0] / length, s[1] / length, s[2] / length, s[3] / length};
+}
+
+Point turned(const Quaternion& q, const Point& v) noexcept {
+    const double x = q[0], y = q[1], z = q[2], w = q[3];
+    return {(1 - 2 * (y * y + z * z)) * v[0] + 2 * (x * y - z * w) * v[1] + 2 * (x * z + y * w) * v[2],
+            2 * (x * y + z * w) * v[0] + (1 - 2 * (x * x + z * z)) * v[1] + 2 * (y * z - x * w) * v[2],
+            2 * (x * z - y * w) * v[0] + 2 * (y * z + x * w) * v[1] + (1 - 2 * (x * x + y * y)) * v[2]};
+}
+Quaternion conjugate(const Quaternion& q) noexcept {
+    return {-q[0], -q[1], -q[2], q[3]};
+}
+Quaternion product(const Quaternion& a, const Quaternion& b) noexcept {
+    return {
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
+}
+
+bool holds_floats(const DoublePose& pose) noexcept {
+    const auto is_float = [](double x) { return static_cast<double>(static_cast<float>(x)) == x; };
+    return std::all_of(std::begin(pose.t), std::end(pose.t), is_float) &&
+           std::all_of(std::begin(pose.q), std::end(pose.q), is_float);
+}
+Pose to_floats(const DoublePose& pose) noexcept {
+    const auto f = [](double x) { return static_cast<float>(x); };
+    return {{f(pose.t[0]), f(pose.t[1]), f(pose.t[2])}, {f(pose.q[0]), f(pose.q[1]), f(pose.q[2]), f(pose.q[3])}};
+}
+
+std::string at_index(const char* name, bool single, size_t i) {
+    return single ? std::string(name) : std::string(name) + "[" + std::to_string(i) + "]";
+}
+
+// S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978.
+DoublePose pose_of(const double (&m)[4][4]) noexcept {
+    DoublePose out;
+    for (size_t i = 0; i < 3; ++i) out.t[i] = m[i][3];
+    const double trace = m[0][0] + m[1][1] + m[2][2];
+    double(&q)[4] = out.q;
+    if (trace >= std::max({m[0][0], m[1][1], m[2][2]})) {
+        q[3] = 1 + trace;
+        for (size_t i = 0; i < 3; ++i) q[i] = m[(i + 2) % 3][(i + 1) % 3] - m[(i + 1) % 3][(i + 2) % 3];
+    } else {
+        const size_t i = m[0][0] >= m[1][1] ? (m[0][0] >= m[2][2] ? 0 : 2) : (m[1][1] >= m[2][2] ? 1 : 2);
+        const size_t j = (i + 1) % 3, k = (i + 2) % 3;
+        q[i] = 1 + m[i][i] - m[j][j] - m[k][k];
+        q[j] = m[i][j] + m[j][i];
+        q[k] = m[i][k] + m[k][i];
+        q[3] = m[k][j] - m[j][k];
+    }
+    return out;
+}
+
+// Doubles of any layout to `own`, the quaternion's real part last.
+void take_sevens(const double* from, size_t count, bool wxyz, std::vector<DoublePose>& own) {
+    own.resize(count);
+    std::memcpy(static_cast<void*>(own.data()), from, count * sizeof(DoublePose));
+    if (wxyz)
+        for (DoublePose& pose : own) std::rotate(std::begin(pose.q), std::begin(pose.q) + 1, std::end(pose.q));
+}
+
+} // namespace
+
+Point transformed(const DoublePose& pose, const Point& p) noexcept {
+    const Point r = rotated(pose, p);
+    return {r[0] + pose.t[0], r[1] + pose.t[1], r[2] + pose.t[2]};
+}
+Point rotated(const DoublePose& pose, const Point& v) noexcept {
+    return turned(unit(pose.q), v);
+}
+Point rotated_back(const DoublePose& pose, const Point& v) noexcept {
+    return turned(conjugate(unit(pose.q)), v);
+}
+
+Poses::Poses(nb::handle value, const char* name, bool wxyz) {
+    AnyArray array = import_array(value);
+    keep_ = nb::borrow(value);
+    const bool is_float = array.is_valid() && array.dtype() == nb::dtype<float>();
+    const bool is_double = array.is_valid() && array.dtype() == nb::dtype<double>();
+    const bool sevens = array.is_valid() && array.ndim() <= 2 && array.ndim() > 0 && array.shape(array.ndim() - 1) == 7;
+    const bool as_is = (is_float || is_double) && is_contiguous(array);
+    if (!as_is || (is_float && (wxyz || !sevens))) {
+        keep_ = as_numpy(value, name, "float64");
+        array = import_array(keep_);
+    }
+    const size_t ndim = array.ndim();
+    const auto size = [&](size_t from_last) { return ndim >= from_last ? array.shape(ndim - from_last) : 0; };
+    const bool matrices = (ndim == 2 || ndim == 3) && size(1) == 4 && size(2) == 4;
+    if (!matrices && !((ndim == 1 || ndim == 2) && size(1) == 7))
+        value_error(name, "must have shape (7,), (N, 7), (4, 4) or (N, 4, 4), not " + shape_text(array));
+    single_ = ndim == (matrices ? 2u : 1u);
+    count_ = single_ ? 1 : array.shape(0);
+    if (matrices) {
+        take_matrices(static_cast<const double*>(array.data()), name);
+    } else if (array.dtype() == nb::dtype<float>()) {
+        floats_ = static_cast<const Pose*>(array.data());
+    } else if (wxyz) {
+        take_sevens(static_cast<const double*>(array.data()), count_, wxyz, own_);
+        doubles_ = own_.data();
+    } else {
+        doubles_ = static_cast<const DoublePose*>(array.data());
+    }
+    check(name);
+}
+
+void Poses::take_matrices(const double* entries, const char* name) {
+    own_.resize(count_);
+    for (size_t i = 0; i < count_; ++i) {
+        Matrix4 matrix;
+        std::memcpy(matrix.m, entries + 16 * i, sizeof matrix.m);
+        if (const auto rigid = pose_from_matrix(matrix); !rigid)
+            value_error(at_index(name, single_, i), rigid.error().what);
+        own_[i] = pose_of(matrix.m);
+    }
+    doubles_ = own_.data();
+}
+
+void Poses::check(const char* name) const {
+    for (size_t i = 0; i < count_; ++i) {
+        const DoublePose pose = at(i);
+        const auto fits = [](double x) { return std::abs(x) <= kMost; }; // false for NaN
+        if (!std::all_of(std::begin(pose.t), std::end(pose.t), fits) ||
+            !std::all_of(std::begin(pose.q), std::end(pose.q), fits))
+            value_error(at_index(name, single_, i), "is not finite, or beyond the range of float32");
+        const double most =
+            std::max({std::abs(pose.q[0]), std::abs(pose.q[1]), std::abs(pose.q[2]), std::abs(pose.q[3])});
+        if (!(most > 1e-18)) value_error(at_index(name, single_, i), "has a quaternion of 0; no rotation is 0 0 0 1");
+    }
+}
+
+DoublePose Poses::at(size_t i) const noexcept {
+    if (!floats_) return doubles_[index(i)];
+    const Pose& p = floats_[index(i)];
+    return {{p.translation.x, p.translation.y, p.translation.z},
+            {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w}};
+}
+
+size_t broadcast(const Poses& a, const char* name_a, const Poses& b, const char* name_b) {
+    if (a.count() == b.count() || b.count() == 1) return a.count();
+    if (a.count() == 1) return b.count();
+    value_error(name_b, "has " + std::to_string(b.count()) + " poses and " + name_a + " " + std::to_string(a.count()) +
+                            "; give as many, or one");
+}
+
+Point PlacedBodies::to_world(const Vec3& p) const noexcept {
+    const Point point = {p.x, p.y, p.z};
+    return in_frame ? transformed(frame, point) : point;
+}
+Point PlacedBodies::direction_to_world(const Vec3& v) const noexcept {
+    const Point direction = {v.x, v.y, v.z};
+    return in_frame ? rotated(frame, direction) : direction;
+}
+
+RoundedPose in_frame(const DoublePose& frame, const DoublePose& body, double reach) noexcept {
+    const Quaternion back = conjugate(unit(frame.q));
+    const Point d = {body.t[0] - frame.t[0], body.t[1] - frame.t[1], body.t[2] - frame.t[2]};
+    const Point t = turned(back, d);
+    const Quaternion q = product(back, unit(body.q));
+    const DoublePose exact{{t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}};
+    const Pose pose = to_floats(exact);
+    const auto square = [](double x) { return x * x; };
+    const double moved = std::sqrt(square(t[0] - pose.translation.x) + square(t[1] - pose.translation.y) +
+                                   square(t[2] - pose.translation.z));
+    const double bent = std::sqrt(square(q[0] - pose.rotation.x) + square(q[1] - pose.rotation.y) +
+                                  square(q[2] - pose.rotation.z) + square(q[3] - pose.rotation.w));
+    // A unit quaternion that is off by `bent`, and made one again, turns by another angle of at most 2 bent (1 + bent).
+    // The last term is more than what double precision loses above.
+    const double distance = std::sqrt(square(d[0]) + square(d[1]) + square(d[2]));
+    return {pose, 1.0001 * (moved + 2 * bent * reach) + 0x1p-46 * (distance + reach)};
+}
+
+PlacedBodies place(const Poses& a, double reach_a, const Poses& b, double reach_b, size_t i) noexcept {
+    PlacedBodies out;
+    if (a.floats() && b.floats()) {
+        out.a = a.floats()[a.index(i)];
+        out.b = b.floats()[b.index(i)];
+        return out;
+    }
+    const DoublePose pose_a = a.at(i), pose_b = b.at(i);
+    if (holds_floats(pose_a) && holds_floats(pose_b)) {
+        out.a = to_floats(pose_a);
+        out.b = to_floats(pose_b);
+        return out;
+    }
+    // The rounding of a rotation moves the smaller body least.
+    out.in_frame = true;
+    const bool frame_is_a = reach_a >= reach_b;
+    out.frame = frame_is_a ? pose_a : pose_b;
+    const RoundedPose other = frame_is_a ? in_frame(pose_a, pose_b, reach_b) : in_frame(pose_b, pose_a, reach_a);
+    (frame_is_a ? out.b : out.a) = other.pose;
+    out.slack = other.slack;
+    return out;
+}
+
+} // namespace prolate::python
