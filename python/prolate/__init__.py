@@ -29,7 +29,7 @@ from ._queries import (
     raycast,
     sweep,
 )
-from ._tree import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Proof, Tree, TreeInfo, load
+from ._tree import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, Tree, TreeInfo, load
 from ._world import World, WorldPairs, WorldVerdicts
 
 __version__ = "0.1.0"
@@ -49,6 +49,7 @@ __all__ = [
     "Hits",
     "LevelInfo",
     "LevelProof",
+    "Mass",
     "Mesh",
     "Proof",
     "Sphere",

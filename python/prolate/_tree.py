@@ -77,6 +77,27 @@ class LevelInfo(NamedTuple):
     hausdorff_p99: float
 
 
+class Mass(NamedTuple):
+    """Mass properties of a solid of density 1 kg / m^3, in the frame of its mesh; multiply them by another density.
+
+    Attributes
+    ----------
+    volume, volume_error : float
+        Cubic metres, and a bound of its error; 0 where there is no inside.
+    center, center_error : tuple of 3 floats, float
+        Centre of mass, metres, and a bound of the error of each coordinate.
+    inertia, inertia_error : tuple of 3 tuples of 3 floats, float
+        Tensor about the centre, along the mesh's axes, kg m^2, and a bound of the error of each entry.
+    """
+
+    volume: float
+    center: tuple[float, float, float]
+    inertia: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+    volume_error: float
+    center_error: float
+    inertia_error: float
+
+
 class Diagnosis(NamedTuple):
     """What the bake found in a mesh, and did about it: counts, lengths in metres."""
 
@@ -110,7 +131,9 @@ class TreeInfo(NamedTuple):
     goal_reached : bool
         False: the asked number, tolerance or distance could not be met.
     volume, volume_error : float
-        Of the solid, cubic metres; 0 where there is no inside.
+        Of the solid, by the columns that all ratios are measured with, cubic metres; 0 where there is no inside.
+    mass : Mass
+        More exact: volume, centre and inertia by integrals over the triangles.
     diagonal : float
         Of the mesh's box, metres.
     scale, origin : tuple of 3 floats
@@ -130,6 +153,7 @@ class TreeInfo(NamedTuple):
     goal_reached: bool
     volume: float
     volume_error: float
+    mass: Mass
     diagonal: float
     scale: tuple[float, float, float]
     origin: tuple[float, float, float]
@@ -269,7 +293,7 @@ class Tree(_core.Tree):
         known = self.info_dict()
         levels = tuple(LevelInfo(**level) for level in known.pop("levels"))
         diagnosis = None if self._diagnosis is None else Diagnosis(**self._diagnosis)
-        return TreeInfo(levels=levels, diagnosis=diagnosis, **known)
+        return TreeInfo(levels=levels, mass=Mass(**known.pop("mass")), diagnosis=diagnosis, **known)
 
     def cut(self, level: int = -1) -> Ellipsoids:
         """The ellipsoids of a level, and of the leaves above it.

@@ -169,6 +169,22 @@ nb::dict level_info(const TreeView& tree, uint32_t l) {
     return out;
 }
 
+nb::tuple three(double a, double b, double c) {
+    return nb::make_tuple(a, b, c);
+}
+
+nb::dict mass_dict(const MassProperties& m) {
+    const auto& [xx, yy, zz, xy, xz, yz] = m.inertia;
+    nb::dict out;
+    out["volume"] = m.volume;
+    out["center"] = three(m.center[0], m.center[1], m.center[2]);
+    out["inertia"] = nb::make_tuple(three(xx, xy, xz), three(xy, yy, yz), three(xz, yz, zz));
+    out["volume_error"] = m.volume_error;
+    out["center_error"] = m.center_error;
+    out["inertia_error"] = m.inertia_error;
+    return out;
+}
+
 nb::dict info_of(const HeldTree& held) {
     const TreeView& tree = held.view;
     const BakeInfo info = tree.bake_info();
@@ -187,9 +203,10 @@ nb::dict info_of(const HeldTree& held) {
     out["goal_reached"] = info.goal_reached;
     out["volume"] = info.solid_volume;
     out["volume_error"] = info.solid_volume * static_cast<double>(info.solid_volume_error);
+    out["mass"] = mass_dict(info.mass);
     out["diagonal"] = info.diagonal;
-    out["scale"] = nb::make_tuple(info.placement.scale[0], info.placement.scale[1], info.placement.scale[2]);
-    out["origin"] = nb::make_tuple(info.placement.origin[0], info.placement.origin[1], info.placement.origin[2]);
+    out["scale"] = three(info.placement.scale[0], info.placement.scale[1], info.placement.scale[2]);
+    out["origin"] = three(info.placement.origin[0], info.placement.origin[1], info.placement.origin[2]);
     out["primitive"] = name_of(info.primitive);
     out["quality"] = name_of(info.quality);
     out["method"] = name_of(info.method);

@@ -123,6 +123,10 @@ def test_info(cover, box_a):
     info = cover.info
     assert info.proved and not info.exact and info.diagnosis is not None and info.diagnosis.closed
     assert abs(info.volume - 8 * HALF_A.prod()) <= info.volume_error + 1e-9
+    x, y, z = HALF_A**2
+    assert abs(info.mass.volume - 8 * HALF_A.prod()) <= 1e-12 + info.mass.volume_error
+    expected = 8 * HALF_A.prod() / 3 * np.diag([y + z, x + z, x + y])
+    assert np.allclose(info.mass.inertia, expected, atol=1e-12) and np.allclose(info.mass.center, 0, atol=1e-12)
     assert info.levels[-1].outside_ratio < info.levels[0].outside_ratio
     assert box_a.info.exact and box_a.info.triangle_count == 12
     assert "12 triangles" in repr(box_a) and "ellipsoids" in repr(cover)
