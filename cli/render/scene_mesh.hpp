@@ -1,13 +1,12 @@
-// The triangles of a mesh, traced by Embree.
+// The triangles of a mesh, as a picture shows them.
 #pragma once
 
 #include "cli/render/scene.hpp"
 #include "cli/render/solid.hpp"
+#include "cli/render/tracer.hpp"
 
 #include <memory>
 #include <vector>
-
-#include <embree3/rtcore.h>
 
 namespace prolate::cli {
 
@@ -24,15 +23,10 @@ public:
     double extent(const glm::dvec3& direction) const override;
 
 private:
-    struct Release {
-        void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-        void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-    };
-    std::vector<glm::vec3> vertices_;
+    std::vector<Vec3> vertices_; // in the frame
     Frame frame_;
     const Solid* solid_;
-    std::unique_ptr<RTCDeviceTy, Release> device_; // destroyed after the scene
-    std::unique_ptr<RTCSceneTy, Release> scene_;
+    std::unique_ptr<Tracer> tracer_;
 };
 
 } // namespace prolate::cli
