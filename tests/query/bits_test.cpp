@@ -11,6 +11,7 @@
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/pairs.hpp>
+#include <prolate/points.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
 #include <prolate/sweep.hpp>
@@ -131,6 +132,16 @@ TEST(Bits, CollideAll) {
         const CollideAllResult r = collide_all(p.a, p.pose_a, p.b, p.pose_b, pairs, context());
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats);
         for (size_t i = 0; i < std::min<uint64_t>(r.found, std::size(pairs)); ++i) bits.add(pairs[i]);
+    });
+}
+
+TEST(Bits, Points) {
+    expect_bits(13696370635778702647u, [](Bits& bits, const Scenes::Pair& p) {
+        const Vec3 points[] = {p.pose_b.translation, p.pose_a.translation, {0.1f, 0.7f, -0.3f}};
+        SignedDistance out[3];
+        signed_distance(p.a, p.pose_a, points, out, context());
+        for (const SignedDistance& r : out)
+            bits.add_all(r.verdict, r.lower, r.upper, r.point, r.gradient, r.node, r.triangle, r.stats);
     });
 }
 

@@ -7,6 +7,7 @@
 #include <prolate/distance.hpp>
 #include <prolate/jobs.hpp>
 #include <prolate/pairs.hpp>
+#include <prolate/points.hpp>
 #include <prolate/poses.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
@@ -45,6 +46,11 @@ int main(int argc, char** argv) {
 
     row("shapes.hpp", overlap(tree, here, Sphere{{0, 0, 0}, 1}, context).verdict == Verdict::overlapping &&
                           overlap(tree, far, HalfSpace{{1, 0, 0}, 0}, context).verdict == Verdict::separated);
+
+    const SignedDistance inside = signed_distance(tree, here, {0, 0, 0}, context),
+                         outside = signed_distance(tree, far, {0, 0, 0}, context);
+    row("points.hpp", inside.upper < 0 && outside.lower > 5 && outside.upper < 10 &&
+                          contains(tree, here, {0, 0, 0}, context) == Verdict::overlapping);
 
     row("pairs.hpp", collide(tree.root(), here, tree.root(), far) == Verdict::separated);
 
