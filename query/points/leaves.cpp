@@ -119,29 +119,28 @@ float PointSearch::square_of(double metres) const noexcept {
 }
 
 bool NearestSearch::leaf(uint32_t slot, double bound) noexcept {
-    const TriangleRange range = side.tree.triangles(slot);
-    if (std::max(range.count, 1u) > left()) return false;
-    if (range.count == 0) {
-        if (ellipsoids)
-            try_ellipsoid(slot, bound);
-        else
-            decided = std::min(decided, bound);
-        return true;
-    }
-    for (uint32_t t = range.first; t < range.first + range.count; ++t) try_triangle(slot, t, bound);
+    if (left() < 1) return false;
+    if (ellipsoids)
+        try_ellipsoid(slot, bound);
+    else
+        decided = std::min(decided, bound);
     return true;
+}
+
+void NearestSearch::look_within(double distance) noexcept {
+    farthest = std::min(farthest, distance);
+    limit = std::min(limit, square_of(farthest));
 }
 
 void NearestSearch::hint(uint32_t t) noexcept {
     const SeenTriangle seen(side.tree, t, point);
     ++stats.triangle_tests;
-    limit = std::min(limit, square_of(glm::length(nearest_on_triangle(seen.p)) + seen.slack));
+    look_within(glm::length(nearest_on_triangle(seen.p)) + seen.slack);
 }
 
 void NearestSearch::try_triangle(uint32_t slot, uint32_t t, double bound) noexcept {
     // Where the nearest point's direction has lost so many digits, the face's normal is tried, too.
     constexpr double kNear = 0x1p-20;
-    ++stats.triangle_tests;
     const SeenTriangle seen(side.tree, t, point);
     const auto& [p, reach, slack] = seen;
     const dvec3 to = nearest_on_triangle(p);
@@ -153,7 +152,8 @@ void NearestSearch::try_triangle(uint32_t slot, uint32_t t, double bound) noexce
             lower = std::max({lower, least_along(p, face / size), least_along(p, -face / size)});
     }
     decided = std::min(decided, std::max({lower - slack, bound, 0.0}));
-    upper = std::min(upper, length + slack), limit = std::min(limit, square_of(upper));
+    upper = std::min(upper, length + slack);
+    look_within(upper);
     if (here > square || (here == square && t >= triangle)) return;
     square = here, nearest = point.position + to, node = slot, triangle = t;
     normal = glm::cross(p[1] - p[0], p[2] - p[0]);
@@ -176,7 +176,8 @@ void NearestSearch::try_ellipsoid(uint32_t slot, double bound) noexcept {
     decided = std::min(decided, std::max({lower - slack, bound, 0.0}));
     const dvec3 on = e.factor * (along / width), to = x - on;
     const double here = glm::dot(to, to);
-    upper = std::min(upper, std::sqrt(here) + slack), limit = std::min(limit, square_of(upper));
+    upper = std::min(upper, std::sqrt(here) + slack);
+    look_within(upper);
     if (here > square || (here == square && slot >= node)) return;
     square = here, nearest = e.center + on, normal = n, node = slot;
 }

@@ -68,7 +68,7 @@ private:
 
     NearestSearch nearest(const PlacedPoint& point, double max_distance, SignedDistance& out) {
         NearestSearch search(tree_, point, context_, max_tests_, ellipsoids_);
-        search.limit = search.square_of(max_distance);
+        search.look_within(max_distance);
         if (known_.triangle != kNoTriangle && search.left() > 0) search.hint(known_.triangle);
         traverse(search);
         search.decided = std::min(search.decided, max_distance);

@@ -19,10 +19,12 @@
 
 #include "query/node/block_box-inl.hpp"
 #include "query/points/search.hpp"
+#include "query/points/triangle_lanes-inl.hpp"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
@@ -66,7 +68,7 @@ public:
             const uint32_t lane = e.node_a % kBlockLanes;
             const bool is_leaf = (s_.side.leaf_lanes(e.node_a - lane, block) >> lane & 1) != 0;
             if (is_leaf) {
-                if (!s_.leaf(e.node_a, s_.metres(e.bound))) return stop(e.bound);
+                if (!leaf(e, block)) return stop(e.bound);
                 continue;
             }
             const ChildRange children = children_in(block, lane);
@@ -76,6 +78,37 @@ public:
     }
 
 private:
+    // False if the tests run out.
+    bool leaf(const Entry& e, const std::byte* block) {
+        if constexpr (std::is_same_v<Search, NearestSearch>) {
+            const uint32_t lane = e.node_a % kBlockLanes, count = load_le<uint8_t>(block + kBlockCount + lane);
+            if (s_.side.hulls != nullptr && count >= kTriangleLeaf)
+                return triangles(e, {first_triangle(block, lane), count - kTriangleLeaf});
+        }
+        return s_.leaf(e.node_a, s_.metres(e.bound));
+    }
+    // A leaf's triangles, four at a time; those that may be near enough are decided, the nearest first.
+    bool triangles(const Entry& e, const TriangleRange& range) {
+        if (range.count > s_.left()) return false;
+        s_.stats.triangle_tests += range.count;
+        const double bound = s_.metres(e.bound);
+        for (uint32_t first = range.first, end = range.first + range.count; first < end; first += kFour) {
+            alignas(16) float lower[kFour];
+            const uint32_t count = std::min<uint32_t>(end - first, kFour);
+            bound_four(s_.side.tree, first, count, s_.point.position, lower);
+            for (uint32_t left = (1u << count) - 1; left != 0;) {
+                auto lane = static_cast<uint32_t>(std::countr_zero(left));
+                for (uint32_t rest = left & (left - 1); rest != 0; rest &= rest - 1)
+                    if (const auto other = static_cast<uint32_t>(std::countr_zero(rest)); lower[other] < lower[lane])
+                        lane = other;
+                left &= ~(1u << lane);
+                if (double{lower[lane]} > s_.farthest) break;
+                s_.try_triangle(e.node_a, first + lane, std::max(bound, double{lower[lane]}));
+            }
+        }
+        return true;
+    }
+
     // One block: puts the lanes that are near enough on the stack, the nearest last. False if the tests run out.
     bool test(uint32_t first, uint32_t count) {
         if (count > s_.left()) return false;

@@ -56,13 +56,20 @@ struct NearestSearch : PointSearch {
     glm::dvec3 normal{0, 0, 0}; ///< of the surface there, of any length
     uint32_t node = 0, triangle = kNoTriangle;
 
-    /// A leaf that is not nearer than `bound`. False, and nothing done, if the budget does not suffice.
+    double farthest = kInfinity; ///< leaves that are farther than this need not be looked at, metres
+
+    /// A leaf without triangles that is not nearer than `bound`. False, and nothing done, if the budget does not
+    /// suffice.
     bool leaf(uint32_t slot, double bound) noexcept;
     /// Nothing farther than this triangle need be looked at.
     void hint(uint32_t t) noexcept;
 
-private:
+    /// A triangle that is not nearer than `bound`.
     void try_triangle(uint32_t slot, uint32_t t, double bound) noexcept;
+    /// Lowers `farthest` and `limit`.
+    void look_within(double distance) noexcept;
+
+private:
     void try_ellipsoid(uint32_t slot, double bound) noexcept;
 };
 

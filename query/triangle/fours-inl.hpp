@@ -42,6 +42,8 @@ public:
     }
     uint32_t count() const { return count_; }
     glm::dvec3 first_corner() const { return {origin_[0], origin_[1], origin_[2]}; }
+    /// As they stand, less the first corner's: coordinate row % 3 of corner row / 3, of the lanes from `i` on.
+    Quad from_first(size_t row, size_t i) const { return at(row, i) - origin_[row % 3]; }
 
     /// Places the corners by x - first corner. Each lane of the result is the greatest of some of the coordinates.
     Quad place() {
@@ -98,9 +100,6 @@ private:
     }
     Quad at(size_t row, size_t i) const {
         return load<Quad>(rows_[row] + i);
-    }
-    Quad from_first(size_t row, size_t i) const {
-        return at(row, i) - origin_[row % 3];
     }
     // Returns the sizes of what it stores, 0 in lanes without a triangle.
     Quad put(size_t row, size_t i, Quad x) {
