@@ -2,10 +2,9 @@
 //
 //   bench_points MESH [--points N]
 //
-// Prints for each set of points the median time of one query, of runs over all points that take turns, and how far the
-// two distances are apart at most. Embree has no inside; what finds the nearest triangle there is the callback of its
-// documentation (closest point of a triangle, in single precision). With --write FILE, the points and our signed
-// distances, for bench/points/peers.py.
+// Prints for each set of points the median time of one query, of runs over all points that take turns, Embree's over
+// that of single queries, and how far the two distances are apart at most. Embree has no inside; what finds the nearest
+// triangle there is the callback of its documentation (closest point of a triangle, in single precision).
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
@@ -19,7 +18,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -168,7 +166,7 @@ template <class... Runs> std::vector<double> medians(size_t queries, Runs&&... r
     return out;
 }
 
-int run(const std::string& path, size_t count, const std::string& write) {
+int run(const std::string& path, size_t count) {
     const auto loaded = load_mesh(path.c_str());
     if (!loaded) return fmt::print(stderr, "bench_points: {}\n", loaded.error().what), 1;
     const auto cleaned = clean(loaded->view());
@@ -181,8 +179,7 @@ int run(const std::string& path, size_t count, const std::string& write) {
     fmt::print("{}: {} triangles, {}; median us a query\n", path, mesh.triangles.size(),
                cleaned->report.closed ? "closed" : "open: no sides");
     fmt::print("{:6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>7} {:>10}\n", "points", "single", "batch", "contains", "Embree",
-               "Embree/us", "inside", "difference");
-    FILE* const file = write.empty() ? nullptr : std::fopen(write.c_str(), "w");
+               "ratio", "inside", "difference");
     for (const PointSet& set : point_sets(mesh, count)) {
         const std::vector<Vec3>& points = set.points;
         std::vector<SignedDistance> out(points.size());
@@ -203,14 +200,11 @@ int run(const std::string& path, size_t count, const std::string& write) {
         for (size_t i = 0; i < points.size(); ++i) {
             inside += sides[i] == Verdict::overlapping;
             difference = std::max(difference, std::abs(std::abs(out[i].upper) - double{theirs[i]}));
-            if (file)
-                fmt::print(file, "{} {} {} {} {}\n", set.name, points[i].x, points[i].y, points[i].z, out[i].upper);
         }
         fmt::print("{:6} {:8.3f} {:8.3f} {:8.3f} {:8.3f} {:9.2f} {:7.2f} {:10.1e}\n", set.name, times[0], times[1],
                    times[2], times[3], times[3] / times[0],
                    static_cast<double>(inside) / static_cast<double>(points.size()), difference);
     }
-    if (file) std::fclose(file);
     return 0;
 }
 
@@ -219,11 +213,10 @@ int run(const std::string& path, size_t count, const std::string& write) {
 
 int main(int argc, char** argv) {
     CLI::App app("Points against meshes, beside Embree");
-    std::string mesh, write;
+    std::string mesh;
     size_t points = 4096;
     app.add_option("mesh", mesh, "a mesh file")->required();
     app.add_option("--points", points, "of each set");
-    app.add_option("--write", write, "points and signed distances, a line each");
     CLI11_PARSE(app, argc, argv);
-    return prolate::run(mesh, points, write);
+    return prolate::run(mesh, points);
 }
