@@ -1,5 +1,6 @@
 // Lower bounds of the distances of four triangles from a point, in single precision. Compiled once for each instruction
-// set; include it below <hwy/foreach_target.h>. The tests have a scalar reference.
+// set; include it below <hwy/foreach_target.h>. tests/query/points compares with all
+// triangles in long double, for each instruction set.
 //
 // Seen from the point, a triangle with corners v_k lies beyond the plane across any direction n at the distance
 //     min n.v_k / |n|
