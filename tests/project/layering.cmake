@@ -11,7 +11,7 @@ cmake_minimum_required(VERSION 3.25)
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
 set(layers include/prolate src query builder viewer cli python)
-set(core_headers "types|error|mass|bake_info|detail/tree_bytes|tree|matrix|version")
+set(core_headers "types|error|mass|primitives|bake_info|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
 set(include/prolate_headers ".*")

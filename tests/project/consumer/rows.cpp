@@ -9,6 +9,7 @@
 #include <prolate/pairs.hpp>
 #include <prolate/points.hpp>
 #include <prolate/poses.hpp>
+#include <prolate/primitives.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
 #include <prolate/sweep.hpp>
@@ -51,6 +52,10 @@ int main(int argc, char** argv) {
                          outside = signed_distance(tree, far, {0, 0, 0}, context);
     row("points.hpp", inside.upper < 0 && outside.lower > 5 && outside.upper < 10 &&
                           contains(tree, here, {0, 0, 0}, context) == Verdict::overlapping);
+
+    const auto floor = box_tree({100, 100, 1});
+    row("primitives.hpp",
+        floor && collide(tree, here, floor->view(), {{0, 0, -1}, {}}, context).verdict == Verdict::overlapping);
 
     row("pairs.hpp", collide(tree.root(), here, tree.root(), far) == Verdict::separated);
 
