@@ -197,29 +197,6 @@ private:
     Patch points_[kManifolds]; // of the second pass
 };
 
-ContactPoint point_of(const Candidate& c, const dvec3& normal, bool exchanged, const RelativePose& to_world) {
-    ContactPoint out;
-    const auto world = [&](double along) {
-        return to_float(to_world.rotation * (c.middle + along * c.depth * normal) + to_world.translation);
-    };
-    out.point_a = world(exchanged ? -0.5 : 0.5), out.point_b = world(exchanged ? 0.5 : -0.5);
-    out.depth = static_cast<float>(c.depth);
-    out.id = c.id;
-    return out;
-}
-
-Manifold manifold_of(const Patch& patch, double same_point, bool exchanged, const RelativePose& to_world) {
-    Manifold out;
-    Candidate points[kManifoldPoints];
-    out.count = patch.reduce(same_point, points);
-    for (uint32_t k = 1; k < out.count; ++k) // by id
-        for (uint32_t at = k; at > 0 && points[at].id < points[at - 1].id; --at) std::swap(points[at], points[at - 1]);
-    const dvec3 normal = patch.normal(), world = to_world.rotation * normal;
-    out.normal = to_float(exchanged ? -world : world);
-    for (uint32_t k = 0; k < out.count; ++k) out.points[k] = point_of(points[k], normal, exchanged, to_world);
-    return out;
-}
-
 } // namespace
 } // namespace query
 

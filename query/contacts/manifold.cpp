@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace prolate::query {
 namespace {
@@ -109,6 +110,44 @@ void Patches::add(const dvec3& normal, const Candidate& candidate, double weight
         return;
     *shallowest = Patch(normal);
     shallowest->add(normal, candidate, weight, overlap, same_point_);
+}
+
+bool Patch::may_take(const PlacedEllipsoid& e, double depth, double same_point) const noexcept {
+    constexpr double kDiagonal = 0.7071067811865476;
+    const dvec3 directions[] = {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
+    if (depth > reach_[0] + std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point)) return true;
+    for (uint32_t i = 0; i < 4; ++i) {
+        const double middle = glm::dot(directions[i], e.center), half = glm::length(directions[i] * e.factor);
+        if (middle + half > reach_[1 + i] + same_point || half - middle > reach_[5 + i] + same_point) return true;
+    }
+    return false;
+}
+
+namespace {
+
+ContactPoint point_of(const Candidate& c, const dvec3& normal, bool exchanged, const RelativePose& to_world) {
+    ContactPoint out;
+    const auto world = [&](double along) {
+        return to_float(to_world.rotation * (c.middle + along * c.depth * normal) + to_world.translation);
+    };
+    out.point_a = world(exchanged ? -0.5 : 0.5), out.point_b = world(exchanged ? 0.5 : -0.5);
+    out.depth = static_cast<float>(c.depth);
+    out.id = c.id;
+    return out;
+}
+
+} // namespace
+
+Manifold manifold_of(const Patch& patch, double same_point, bool exchanged, const RelativePose& to_world) noexcept {
+    Manifold out;
+    Candidate points[kManifoldPoints];
+    out.count = patch.reduce(same_point, points);
+    for (uint32_t k = 1; k < out.count; ++k) // by id
+        for (uint32_t at = k; at > 0 && points[at].id < points[at - 1].id; --at) std::swap(points[at], points[at - 1]);
+    const dvec3 normal = patch.normal(), world = to_world.rotation * normal;
+    out.normal = to_float(exchanged ? -world : world);
+    for (uint32_t k = 0; k < out.count; ++k) out.points[k] = point_of(points[k], normal, exchanged, to_world);
+    return out;
 }
 
 } // namespace prolate::query

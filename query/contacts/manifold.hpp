@@ -9,6 +9,8 @@
 // Points of the last query are preferred while another is better by less than a tenth, so that what rests stays.
 #pragma once
 
+#include "query/ellipsoid/placed.hpp"
+
 #include <prolate/contacts.hpp>
 
 #include <glm/vec3.hpp>
@@ -39,6 +41,9 @@ public:
     /// to each other than `same_point` count as one.
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
              double same_point) noexcept;
+    /// May a point of the ellipsoid that is no deeper than `depth` take the place of one, be it deeper by more than 1 %
+    /// or a tenth of same_point, or farther out? Ask only if there are points.
+    bool may_take(const PlacedEllipsoid& e, double depth, double same_point) const noexcept;
     bool empty() const noexcept { return !any_; }
     double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; } ///< of the deepest point
     double overlap() const noexcept { return overlap_; }                      ///< the largest
@@ -58,6 +63,10 @@ private:
     double overlap_ = -1e300;
     bool any_ = false;
 };
+
+/// The manifold of a patch, in the world. `exchanged`: the caller has the bodies the other way round. `to_world`: from
+/// A's frame.
+Manifold manifold_of(const Patch& patch, double same_point, bool exchanged, const RelativePose& to_world) noexcept;
 
 /// Sorts points into patches by their normals: the deepest of them, if there are more.
 class Patches {

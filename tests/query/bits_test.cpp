@@ -10,6 +10,7 @@
 #include <prolate/collide.hpp>
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
+#include <prolate/half_space.hpp>
 #include <prolate/pairs.hpp>
 #include <prolate/points.hpp>
 #include <prolate/raycast.hpp>
@@ -132,6 +133,21 @@ TEST(Bits, CollideAll) {
         const CollideAllResult r = collide_all(p.a, p.pose_a, p.b, p.pose_b, pairs, context());
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats);
         for (size_t i = 0; i < std::min<uint64_t>(r.found, std::size(pairs)); ++i) bits.add(pairs[i]);
+    });
+}
+
+TEST(Bits, HalfSpace) {
+    expect_bits(17376768778797159833u, [](Bits& bits, const Scenes::Pair& p) {
+        const HalfSpace ground{p.pose_b.translation, 0.1f};
+        const DistanceResult d = distance(p.a, p.pose_a, ground, context());
+        bits.add_all(d.verdict, d.lower, d.upper, d.point_a, d.point_b, d.normal, d.pair.node_a, d.stats);
+        ContactManifolds manifolds;
+        const ContactResult c = contacts(p.a, p.pose_a, ground, manifolds, context(), {.margin = 0.05f});
+        bits.add_all(c.verdict, c.found, c.stats, manifolds.count);
+        for (uint32_t k = 0; k < manifolds.count * manifolds.manifolds[0].count; ++k) {
+            const ContactPoint& point = manifolds.manifolds[0].points[k];
+            bits.add_all(point.point_a, point.point_b, point.depth, point.id);
+        }
     });
 }
 

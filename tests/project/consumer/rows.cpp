@@ -5,6 +5,7 @@
 #include <prolate/collide.hpp>
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
+#include <prolate/half_space.hpp>
 #include <prolate/jobs.hpp>
 #include <prolate/pairs.hpp>
 #include <prolate/points.hpp>
@@ -52,6 +53,10 @@ int main(int argc, char** argv) {
                          outside = signed_distance(tree, far, {0, 0, 0}, context);
     row("points.hpp", inside.upper < 0 && outside.lower > 5 && outside.upper < 10 &&
                           contains(tree, here, {0, 0, 0}, context) == Verdict::overlapping);
+
+    const DistanceResult above = distance(tree, far, HalfSpace{{1, 0, 0}, 0}, context);
+    contacts(tree, here, HalfSpace{{1, 0, 0}, 0}, manifolds, context);
+    row("half_space.hpp", above.lower > 5 && above.upper < 10 && manifolds.count == 1);
 
     const auto floor = box_tree({100, 100, 1});
     row("primitives.hpp",

@@ -1,0 +1,31 @@
+// Ground: how far is a body from a half-space, and where does it touch it? The half-space takes the place of the second
+// body; query.hpp says what bodies are. shapes.hpp has HalfSpace, and asks for the verdict alone.
+//
+// A half-space is no tree, and reaches everywhere: these queries cost a small part of those against a box for a floor
+// (primitives.hpp). sweep() and worlds take such a box.
+#pragma once
+
+#include <prolate/contacts.hpp>
+#include <prolate/distance.hpp>
+#include <prolate/shapes.hpp>
+
+namespace prolate {
+
+/// Distance of the body from the half-space: as that of two bodies, with the same certificates, point_b on the plane
+/// below point_a, and the normal against that of the half-space. The verdict is that of overlap(). Of `pair`, node_b
+/// and triangle_b mean nothing. With a half-space that is not finite, or whose normal is 0, nothing is certain:
+/// undecided, 0 <= distance <= infinity. max_level of the options is not used. Thread-safe on shared trees.
+DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
+                        const DistanceOptions& options = {}) noexcept;
+
+/// Contacts of the body with the half-space: one manifold, whose normal is against that of the half-space (moving the
+/// half-space along it takes it out of the body). Its points are the corners of an exact tree, or of ellipsoids the
+/// deepest points, that lie in the half-space or within options.margin of it: the deepest (to within 1 %, or 1e-5 of
+/// the body's size), and those that span the largest area with it. Their ids name the vertex or node. Replaces the
+/// contents of `manifolds`; points that were there before keep their age and impulse. The verdict is that of overlap(),
+/// at full depth; if it is overlapping, there is a point. ContactResult::found counts the corners that were looked at
+/// and touch. Thread-safe on shared trees.
+ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
+                       QueryContext& context, const QueryOptions& options = {}) noexcept;
+
+} // namespace prolate

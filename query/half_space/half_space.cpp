@@ -1,0 +1,228 @@
+// distance() and contacts() of a body and a half-space: the traversal (search.cpp) finds what is lowest, or all that
+// lies in the half-space; corners and ellipsoids are placed in double precision, and separated() of query/shapes
+// decides.
+//
+// Of contacts, a node is passed over if nothing in it could take a place in the manifold's sieve: the sieve keeps what
+// is deepest, and outermost in eight directions (query/contacts/manifold.hpp). So a flat bottom of a thousand triangles
+// costs little more than one of ten.
+#include <prolate/half_space.hpp>
+
+#include "query/contacts/last_contacts.hpp"
+#include "query/contacts/manifold.hpp"
+#include "query/contacts/pair_contacts.hpp"
+#include "query/half_space/search.hpp"
+#include "query/triangle/placed.hpp"
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace prolate {
+namespace query {
+namespace {
+
+using glm::dvec3;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSamePoint = 1e-4; // of the body: what is nearer is one point
+
+bool is_finite(const PlacedHalfSpace& h) {
+    return std::isfinite(h.normal.x + h.normal.y + h.normal.z + h.offset + h.reach);
+}
+// Of a point, in the tree's frame.
+double height(const dvec3& p, const PlacedHalfSpace& h) {
+    return glm::dot(h.normal, p) - h.offset;
+}
+PlacedHalfSpace moved(PlacedHalfSpace h, double margin) {
+    h.offset += margin, h.reach += margin;
+    return h;
+}
+// The lowest point of an ellipsoid.
+dvec3 lowest(const PlacedEllipsoid& e, const dvec3& n) {
+    const dvec3 m = n * e.factor;
+    const double length = glm::length(m);
+    return length > 0 ? e.center - e.factor * (m / length) : e.center;
+}
+
+// The lowest point of a body.
+class Lowest {
+public:
+    explicit Lowest(HeightSearch& search) : s_(search) {
+        s_.user = this;
+        s_.leaf = [](void* self, uint32_t slot) { return static_cast<Lowest*>(self)->leaf(slot); };
+    }
+
+    double lower = kInfinity;  // no leaf that was looked at is lower
+    double height = kInfinity; // of the lowest point, which is
+    dvec3 point{0, 0, 0};      // this one
+    double slack = 0;          // what its height may be wrong by
+    MeetingPair pair{};
+    bool meets = false; // some leaf, by separated()
+
+private:
+    bool leaf(uint32_t slot) {
+        const TriangleRange range = s_.side.tree.triangles(slot);
+        if (std::max(range.count, 1u) > s_.left()) return false;
+        s_.stats.triangle_tests += std::max(range.count, 1u);
+        if (range.count == 0) {
+            const PlacedEllipsoid e = place(s_.side.tree.bound(slot));
+            consider(lowest(e, s_.shape.normal), e.reach, !separated(e, s_.shape), {slot, 0, kNoTriangle, kNoTriangle});
+        }
+        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+            const PlacedTriangle triangle = place(s_.side.tree, t);
+            const dvec3* const low =
+                std::min_element(triangle.corner, triangle.corner + 3, [&](const dvec3& a, const dvec3& b) {
+                    return glm::dot(s_.shape.normal, a) < glm::dot(s_.shape.normal, b);
+                });
+            consider(*low, triangle.reach, !separated(triangle, s_.shape), {slot, 0, t, kNoTriangle});
+        }
+        return true;
+    }
+    void consider(const dvec3& p, double reach, bool meet, const MeetingPair& of) {
+        const double here = query::height(p, s_.shape), rounding = kSeparationMargin * (reach + s_.shape.reach);
+        meets = meets || meet;
+        lower = std::min(lower, meet ? 0 : std::max(here - rounding, std::numeric_limits<double>::min()));
+        if (!(here < height)) return;
+        height = here, point = p, pair = of, slack = rounding;
+        s_.limit = std::min(s_.limit, here + rounding);
+    }
+
+    HeightSearch& s_;
+};
+
+// All corners and ellipsoids that touch, sieved.
+class Touching {
+public:
+    Touching(HeightSearch& search, double margin, const LastContacts& last)
+        : s_(search), last_(last), touched_(moved(search.shape, margin)),
+          same_point(kSamePoint * place(search.side.tree.root()).size), patch(-search.shape.normal) {
+        std::fill(std::begin(seen_), std::end(seen_), kNoTriangle);
+        s_.user = this;
+        s_.leaf = [](void* self, uint32_t slot) { return static_cast<Touching*>(self)->leaf(slot); };
+        s_.wanted = [](void* self, uint32_t slot, double bound) {
+            return static_cast<Touching*>(self)->wanted(slot, bound);
+        };
+    }
+
+private:
+    HeightSearch& s_;
+    const LastContacts& last_;
+    const PlacedHalfSpace touched_; // blown up by the margin
+
+public:
+    const double same_point;
+    Patch patch;
+    uint64_t found = 0;
+    bool meets = false;
+
+private:
+    bool leaf(uint32_t slot) {
+        const TreeView& tree = s_.side.tree;
+        const TriangleRange range = tree.triangles(slot);
+        if (std::max(range.count, 1u) > s_.left()) return false;
+        s_.stats.triangle_tests += std::max(range.count, 1u);
+        if (range.count == 0) {
+            const PlacedEllipsoid e = place(tree.bound(slot));
+            if (!separated(e, touched_))
+                add(lowest(e, s_.shape.normal), {Part::Kind::node, slot, 0}, slot, kNoTriangle);
+        }
+        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+            const PlacedTriangle triangle = place(tree, t);
+            if (separated(triangle, touched_)) continue;
+            const Triangle corners = tree.triangle(t);
+            const double rounding = kSeparationMargin * (triangle.reach + touched_.reach);
+            for (size_t k = 0; k < 3; ++k)
+                if (uint32_t& seen = seen_[corners[k] % std::size(seen_)];
+                    seen != corners[k] && height(triangle.corner[k], touched_) <= rounding) {
+                    seen = corners[k];
+                    add(triangle.corner[k], {Part::Kind::vertex, corners[k], 0}, slot, t);
+                }
+        }
+        return true;
+    }
+    void add(const dvec3& p, const Part& part, uint32_t slot, uint32_t triangle) {
+        const double depth = -height(p, s_.shape);
+        const uint64_t id = id_of(part, {Part::Kind::face, 0, 0});
+        const dvec3 n = -s_.shape.normal;
+        ++found, meets = true;
+        patch.add(n,
+                  {.middle = p - 0.5 * depth * n,
+                   .depth = depth,
+                   .id = id,
+                   .known = last_.knows(id, n),
+                   .normal = n,
+                   .pair = {slot, 0, triangle, kNoTriangle}},
+                  1, depth, same_point);
+    }
+    bool wanted(uint32_t slot, double bound) const {
+        return patch.empty() || patch.may_take(place(s_.side.tree.bound(slot)), -bound, same_point);
+    }
+
+    uint32_t seen_[16]; // corners that were added last: most belong to several triangles
+};
+
+} // namespace
+} // namespace query
+
+DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
+                        const DistanceOptions& options) noexcept {
+    DistanceResult out;
+    const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
+    if (!query::is_finite(shape)) return out;
+    query::HeightSearch search(tree, shape, context, {.max_pair_tests = options.max_pair_tests});
+    search.limit = query::sound_length(options.max_distance);
+    query::Lowest lowest(search);
+    query::traverse(search);
+    out.stats = search.stats;
+    out.stats.deepest_level = search.side.deepest_level();
+    const double cut = std::min(lowest.lower, query::sound_length(options.max_distance));
+    out.lower = std::max(0.0, std::min(cut, search.open));
+    if (lowest.height < query::kInfinity)
+        out.upper = std::max(0.0, lowest.meets ? lowest.height : lowest.height + lowest.slack);
+    if (lowest.meets)
+        out.verdict = Verdict::overlapping, out.lower = 0;
+    else if (out.lower > 0)
+        out.verdict = Verdict::separated;
+    const query::RelativePose to_world = query::relative_pose(Pose{}, pose);
+    const auto world = [&](const glm::dvec3& p) {
+        return query::to_float(to_world.rotation * p + to_world.translation);
+    };
+    out.pair = lowest.pair;
+    out.point_a = world(lowest.point);
+    out.point_b = world(lowest.point - std::max(0.0, lowest.height) * shape.normal);
+    if (out.upper > 0) out.normal = query::to_float(to_world.rotation * -shape.normal);
+    return out;
+}
+
+ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
+                       QueryContext& context, const QueryOptions& query_options) noexcept {
+    const QueryOptions options = query::sound(query_options);
+    const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
+    const query::RelativePose to_world = query::relative_pose(Pose{}, pose);
+    const query::LastContacts last(manifolds, false, to_world);
+    manifolds = {};
+    ContactResult out;
+    if (!query::is_finite(shape) || !std::isfinite(options.margin)) {
+        out.verdict = Verdict::overlapping; // as overlap() has it; there is no place for points
+        return out;
+    }
+    query::HeightSearch search(tree, shape, context, options);
+    search.limit = options.margin + query::kSeparationMargin * (shape.reach + query::place(tree.bound(0)).reach) * 4;
+    query::Touching touching(search, options.margin, last);
+    query::traverse(search);
+    out.found = touching.found;
+    out.stats = search.stats;
+    out.stats.deepest_level = search.side.deepest_level();
+    if (touching.meets)
+        out.verdict = Verdict::overlapping;
+    else if (!(search.open < query::kInfinity))
+        out.verdict = Verdict::separated;
+    if (touching.patch.empty()) return out;
+    manifolds.count = 1;
+    manifolds.manifolds[0] = query::manifold_of(touching.patch, touching.same_point, false, to_world);
+    last.hand_on(manifolds.manifolds[0]);
+    return out;
+}
+
+} // namespace prolate

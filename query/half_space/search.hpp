@@ -1,0 +1,45 @@
+// A tree against a half-space: what the vectorised traversal (search.cpp) and the queries (half_space.cpp) share.
+// Everything in the frame of the tree. A height is a distance from the plane, above 0 outside the half-space.
+#pragma once
+
+#include "query/node/limits.hpp"
+#include "query/node/tree_side.hpp"
+#include "query/shapes/lanes.hpp"
+#include "query/shapes/rounded_box.hpp"
+
+#include <prolate/query.hpp>
+
+#include <cstdint>
+#include <limits>
+
+namespace prolate::query {
+
+struct HeightSearch {
+    TreeSide side;
+    const PlacedHalfSpace shape;
+    const LaneHalfSpace lanes;
+    const uint64_t max_tests;
+    QueryContext::Entry* const stack;
+    QueryStats stats;
+
+    double limit = std::numeric_limits<double>::infinity(); ///< nodes that are higher need not be looked at, metres
+    double open = std::numeric_limits<double>::infinity();  ///< least height of what is left where the budget ran out
+
+    /// Called for each leaf that is not higher than `limit`, which it may lower. False ends the search.
+    bool (*leaf)(void* user, uint32_t slot) = nullptr;
+    /// Called for each node that is no lower than `bound`, metres: need it be looked at? Null: always.
+    bool (*wanted)(void* user, uint32_t slot, double bound) = nullptr;
+    void* user = nullptr;
+
+    HeightSearch(const TreeView& tree, const PlacedHalfSpace& half_space, QueryContext& context,
+                 const QueryOptions& options) noexcept
+        : side(tree_side(tree, options.max_level)), shape(half_space),
+          lanes(lane_half_space(half_space, tree.raw().lattice())), max_tests(options.max_pair_tests),
+          stack(context.entries) {}
+    uint64_t left() const noexcept { return tests_left(max_tests, stats.tests()); }
+};
+
+/// Leaves in rising order of the bounds of their heights, roughly.
+void traverse(HeightSearch& search) noexcept;
+
+} // namespace prolate::query

@@ -1,0 +1,225 @@
+// Bodies against half-spaces: all corners and all ellipsoids by brute force, in long double.
+#include "tests/exact_scenes.hpp"
+#include "tests/reference.hpp"
+#include "tests/scenes.hpp"
+#include "tests/shapes.hpp"
+#include "tests/targets.hpp"
+
+#include <prolate/half_space.hpp>
+#include <prolate/primitives.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+using reference::Real;
+using reference::Vector;
+using reference::operator*;
+using reference::operator-;
+using scenes::Point;
+using scenes::Random;
+
+struct Plane {
+    Vector normal;
+    Real offset;
+    Real height(const Vector& p) const { return reference::dot(normal, p) - offset; }
+};
+Plane plane_of(const HalfSpace& h) {
+    const Vector n = reference::vector(h.normal);
+    const Real length = reference::length(n);
+    return {{n[0] / length, n[1] / length, n[2] / length}, h.offset};
+}
+Vector to_world(const Pose& pose, const Vector& p) {
+    const Vector r = reference::rotation(pose.rotation) * p, t = reference::vector(pose.translation);
+    return {r[0] + t[0], r[1] + t[1], r[2] + t[2]};
+}
+
+// Heights of all corners of a tree, or the least of each leaf ellipsoid.
+std::vector<Real> heights(const TreeView& tree, const Pose& pose, const Plane& plane) {
+    std::vector<Real> out;
+    for (uint32_t v = 0; v < tree.vertex_count(); ++v)
+        out.push_back(plane.height(to_world(pose, reference::vector(tree.vertex(v)))));
+    if (tree.has_triangles()) return out;
+    const Vector n = reference::transposed(reference::rotation(pose.rotation)) * plane.normal;
+    tree.for_each_in_cut(tree.level_count() - 1, [&](uint32_t slot) {
+        const Ellipsoid e = tree.ellipsoid(slot);
+        const Vector m{e.l11 * n[0] + e.l21 * n[1] + e.l31 * n[2], e.l22 * n[1] + e.l32 * n[2], e.l33 * n[2]};
+        out.push_back(plane.height(to_world(pose, reference::vector(e.center))) - reference::length(m));
+    });
+    return out;
+}
+
+struct Bodies {
+    std::vector<std::vector<std::byte>> bytes;
+    std::vector<TreeView> trees;
+    Bodies() {
+        Random random(8);
+        bytes.push_back(scenes::exact_tree(shapes::torus(1, 0.3f, 32, 16)).bytes);
+        bytes.push_back(scenes::exact_tree(shapes::box(1, 2, 0.5f)).bytes);
+        bytes.push_back(scenes::exact_tree(shapes::sheet(2, 2, 12), {.closed = false}).bytes);
+        bytes.push_back(scenes::tree(random, scenes::cloud(random, 400), {.degree = 8, .levels = 3}).bytes);
+        for (const auto& b : bytes) trees.push_back(*TreeView::open(b));
+    }
+};
+
+HalfSpace ground(Random& random) {
+    const Point n = random.direction();
+    const double length = random.log_in(0.1, 10);
+    return {scenes::to_float({length * n[0], length * n[1], length * n[2]}), static_cast<float>(random.in(-1.5, 1.5))};
+}
+
+TEST(HalfSpace, DistancesAgainstAllCorners) {
+    const Bodies bodies;
+    targets::for_each([&](const char* target) {
+        SCOPED_TRACE(target);
+        Random random(1);
+        const auto context = std::make_unique<QueryContext>();
+        int separated = 0;
+        for (int i = 0; i < 600; ++i) {
+            const TreeView& tree = bodies.trees[static_cast<size_t>(i) % bodies.trees.size()];
+            const Pose pose = scenes::pose_at(random, random.in(0, 3));
+            const HalfSpace half_space = ground(random);
+            const std::vector<Real> all = heights(tree, pose, plane_of(half_space));
+            const Real truth = std::max(*std::min_element(all.begin(), all.end()), Real{0});
+            const DistanceResult got = distance(tree, pose, half_space, *context);
+            EXPECT_EQ(got.verdict, overlap(tree, pose, half_space, *context).verdict);
+            EXPECT_LE(got.lower, truth + 1e-17L);
+            EXPECT_GE(got.upper, truth - 1e-17L);
+            EXPECT_LE(got.upper - got.lower, 1e-11);
+            separated += got.verdict == Verdict::separated;
+            const Real apart = reference::length(reference::vector(got.point_a) - reference::vector(got.point_b));
+            EXPECT_NEAR(static_cast<double>(apart), static_cast<double>(truth), 2e-6);
+            const DistanceResult near = distance(tree, pose, half_space, *context, {.max_distance = 0.25});
+            EXPECT_EQ(near.verdict, got.verdict);
+            EXPECT_LE(near.lower, got.lower);
+            EXPECT_GE(near.lower, std::min(got.lower, 0.25));
+        }
+        EXPECT_GT(separated, 100);
+        EXPECT_LT(separated, 500);
+    });
+}
+
+void check_contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, float margin,
+                    QueryContext& context) {
+    const Plane plane = plane_of(half_space);
+    const std::vector<Real> all = heights(tree, pose, plane);
+    const Real lowest = *std::min_element(all.begin(), all.end());
+    ContactManifolds manifolds;
+    const ContactResult got = contacts(tree, pose, half_space, manifolds, context, {.margin = margin});
+    EXPECT_EQ(got.verdict, overlap(tree, pose, half_space, context, {.margin = margin}).verdict);
+    ASSERT_EQ(manifolds.count, got.verdict == Verdict::overlapping ? 1u : 0u);
+    if (manifolds.count == 0) return;
+    const Manifold& m = manifolds.manifolds[0];
+    ASSERT_GT(m.count, 0u);
+    Real deepest = -HUGE_VALL;
+    for (uint32_t k = 0; k < m.count; ++k) {
+        const ContactPoint& p = m.points[k];
+        deepest = std::max(deepest, Real{p.depth});
+        EXPECT_GE(p.depth, -margin - 1e-6f);
+        EXPECT_NEAR(static_cast<double>(plane.height(reference::vector(p.point_a))), -p.depth, 2e-6);
+        EXPECT_NEAR(static_cast<double>(plane.height(reference::vector(p.point_b))), 0, 2e-6);
+    }
+    EXPECT_NEAR(static_cast<double>(deepest), static_cast<double>(-lowest),
+                0.011 * std::abs(static_cast<double>(lowest)) + 2e-4);
+    EXPECT_NEAR(static_cast<double>(reference::dot(plane.normal, reference::vector(m.normal))), -1, 1e-6);
+}
+
+TEST(HalfSpace, ContactsAgainstAllCorners) {
+    const Bodies bodies;
+    targets::for_each([&](const char* target) {
+        SCOPED_TRACE(target);
+        Random random(2);
+        const auto context = std::make_unique<QueryContext>();
+        for (int i = 0; i < 600; ++i) {
+            const TreeView& tree = bodies.trees[static_cast<size_t>(i) % bodies.trees.size()];
+            check_contacts(tree, scenes::pose_at(random, random.in(0, 2)), ground(random), i % 3 == 0 ? 0.1f : 0,
+                           *context);
+        }
+    });
+}
+
+// What lies flat touches with its corners, however fine its bottom is meshed.
+TEST(HalfSpace, WhatLiesFlatSpansItsBottom) {
+    const scenes::ExactScene sheet = scenes::exact_tree(shapes::sheet(2, 1, 40), {.closed = false});
+    const auto context = std::make_unique<QueryContext>();
+    ContactManifolds manifolds;
+    const ContactResult got =
+        contacts(*TreeView::open(sheet.bytes), {{0, 0, -0.01f}, {}}, {{0, 0, 1}, 0}, manifolds, *context);
+    ASSERT_EQ(manifolds.count, 1u);
+    const Manifold& m = manifolds.manifolds[0];
+    ASSERT_EQ(m.count, 4u);
+    for (const ContactPoint& p : m.points) {
+        EXPECT_TRUE(p.point_a.x == 0 || p.point_a.x == 2);
+        EXPECT_TRUE(p.point_a.y == 0 || p.point_a.y == 1);
+        EXPECT_NEAR(p.depth, 0.01, 1e-6);
+    }
+    EXPECT_LT(got.stats.triangle_tests, 3200u / 3); // of 3200 triangles
+}
+
+TEST(HalfSpace, PointsKeepTheirAgeAndImpulse) {
+    const Tree box = std::move(*box_tree({0.5f, 0.5f, 0.5f}));
+    const auto context = std::make_unique<QueryContext>();
+    ContactManifolds manifolds;
+    for (uint32_t step = 0; step < 5; ++step) {
+        const float x = 0.01f * static_cast<float>(step);
+        contacts(box.view(), {{x, 0, 0.499f}, {0, 0, x, 1}}, {{0, 0, 1}, 0}, manifolds, *context);
+        ASSERT_EQ(manifolds.count, 1u);
+        ASSERT_EQ(manifolds.manifolds[0].count, 4u);
+        for (ContactPoint& p : manifolds.manifolds[0].points) {
+            EXPECT_EQ(p.age, step);
+            EXPECT_EQ(p.impulse[0], static_cast<float>(step));
+            p.impulse[0] += 1;
+        }
+    }
+}
+
+TEST(HalfSpace, BudgetsOnlyWiden) {
+    const Bodies bodies;
+    Random random(3);
+    const auto context = std::make_unique<QueryContext>();
+    for (int i = 0; i < 100; ++i) {
+        const TreeView& tree = bodies.trees[static_cast<size_t>(i) % bodies.trees.size()];
+        const Pose pose = scenes::pose_at(random, random.in(0, 2));
+        const HalfSpace half_space = ground(random);
+        const DistanceResult whole = distance(tree, pose, half_space, *context);
+        for (uint64_t budget = 0; budget < whole.stats.tests(); budget += 1 + budget / 2) {
+            const DistanceResult got = distance(tree, pose, half_space, *context, {.max_pair_tests = budget});
+            EXPECT_LE(got.stats.tests(), budget);
+            EXPECT_LE(got.lower, whole.lower);
+            EXPECT_GE(got.upper, whole.upper);
+            EXPECT_TRUE(got.verdict == Verdict::undecided || got.verdict == whole.verdict);
+            ContactManifolds manifolds;
+            const ContactResult c = contacts(tree, pose, half_space, manifolds, *context, {.max_pair_tests = budget});
+            EXPECT_LE(c.stats.tests(), budget);
+            EXPECT_TRUE(c.verdict == Verdict::undecided || c.verdict == whole.verdict);
+        }
+    }
+}
+
+TEST(HalfSpace, WhatIsNotFiniteIsNeverSeparated) {
+    const Tree box = std::move(*box_tree({0.5f, 0.5f, 0.5f}));
+    const auto context = std::make_unique<QueryContext>();
+    const float nan = std::numeric_limits<float>::quiet_NaN(), infinite = std::numeric_limits<float>::infinity();
+    const HalfSpace bad[] = {{{0, 0, 0}, -9}, {{0, nan, 1}, -9}, {{0, infinite, 1}, -9}, {{0, 0, 1}, nan}};
+    for (const HalfSpace& h : bad) {
+        ContactManifolds manifolds;
+        EXPECT_NE(contacts(box.view(), {}, h, manifolds, *context).verdict, Verdict::separated);
+        EXPECT_EQ(manifolds.count, 0u);
+        EXPECT_EQ(distance(box.view(), {}, h, *context).verdict, Verdict::undecided);
+    }
+    const Pose poses[] = {{{nan, 0, 0}, {}}, {{}, {0, 0, 0, 0}}};
+    for (const Pose& pose : poses) {
+        ContactManifolds manifolds;
+        EXPECT_NE(contacts(box.view(), pose, {{0, 0, 1}, -9}, manifolds, *context).verdict, Verdict::separated);
+        EXPECT_EQ(distance(box.view(), pose, {{0, 0, 1}, -9}, *context).verdict, Verdict::undecided);
+    }
+}
+
+} // namespace
+} // namespace prolate
