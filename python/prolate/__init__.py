@@ -10,6 +10,7 @@ from ._bake import bake, bake_mesh
 from ._bake_many import Asset, BakeResult, bake_many
 from ._errors import Error
 from ._mesh import Mesh, load_mesh
+from ._primitives import box_tree, convex_tree, cylinder_tree, ellipsoid_tree, sphere_tree
 from ._queries import (
     Bounds,
     Box,
@@ -18,15 +19,18 @@ from ._queries import (
     Distances,
     HalfSpace,
     Hits,
+    SignedDistances,
     Sphere,
     Sweeps,
     Verdict,
     bounds,
     collide,
     contacts,
+    contains,
     distance,
     overlap,
     raycast,
+    signed_distance,
     sweep,
 )
 from ._tree import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, Tree, TreeInfo, load
@@ -52,6 +56,7 @@ __all__ = [
     "Mass",
     "Mesh",
     "Proof",
+    "SignedDistances",
     "Sphere",
     "Sweeps",
     "Tree",
@@ -65,13 +70,20 @@ __all__ = [
     "bake_many",
     "bake_mesh",
     "bounds",
+    "box_tree",
     "collide",
     "contacts",
+    "contains",
+    "convex_tree",
+    "cylinder_tree",
     "distance",
+    "ellipsoid_tree",
     "load",
     "load_mesh",
     "overlap",
     "pairs",
     "raycast",
+    "signed_distance",
+    "sphere_tree",
     "sweep",
 ]

@@ -146,6 +146,32 @@ class Hits(NamedTuple):
     verdict: Verdicts
 
 
+class SignedDistances(NamedTuple):
+    """Signed distances of N points from the surface of a body; scalars and ``(3,)`` for a single point.
+
+    Attributes
+    ----------
+    lower, upper : float64 (N,)
+        Certified bounds, metres; above 0 outside, below 0 inside.
+    point : float64 (N, 3)
+        The nearest point of the surface, world; NaN if none was reached.
+    gradient : float64 (N, 3)
+        Unit vector along which the signed distance grows fastest; at the surface, its normal.
+    node, triangle : int64 (N,)
+        The leaf that ``point`` lies on and, of an exact tree, the triangle; -1 if there is none.
+    verdict : uint8 (N,)
+        :class:`Verdict`: ``SEPARATED`` is outside, certainly; ``OVERLAPPING`` inside, or as near as rounding.
+    """
+
+    lower: Floats
+    upper: Floats
+    point: Floats
+    gradient: Floats
+    node: NDArray[np.int64]
+    triangle: NDArray[np.int64]
+    verdict: Verdicts
+
+
 class Bounds(NamedTuple):
     """Axis-aligned boxes of N placed bodies, ``lower`` and ``upper`` ``(N, 3)``, world, metres."""
 
@@ -488,6 +514,72 @@ def overlap(
     """
     kind, numbers = _numbers(shape)
     found = _core.overlap(tree, poses, kind, numbers, margin, max_level, budget, threads, out, _is_wxyz(order))
+    return _VERDICTS[found] if isinstance(found, int) else found
+
+
+_IDENTITY = (0, 0, 0, 0, 0, 0, 1)
+_IDENTITY_WXYZ = (0, 0, 0, 1, 0, 0, 0)
+
+
+def signed_distance(
+    tree: Tree,
+    points: ArrayLike,
+    pose: ArrayLike | None = None,
+    *,
+    max_distance: float | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> SignedDistances:
+    """How far are N points from a body, and on which side of its surface?
+
+    Parameters
+    ----------
+    tree : Tree
+        The body. An exact tree of an open mesh has no inside: its distances are above 0.
+    points : array of shape (3,) or (N, 3)
+        World, metres. In float64 they are taken into the body's frame in double precision; the bounds are widened by
+        what rounding there moves. Points that follow each other closely are answered sooner.
+    pose : array of shape (7,) or (4, 4), optional
+        Of the body; the identity by default.
+    max_distance : float, optional
+        Stop as soon as a point is certain to be at least this far from the surface, metres.
+    budget, threads, order
+        As for :func:`collide`.
+
+    Returns
+    -------
+    SignedDistances
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`collide`.
+    """
+    wxyz = _is_wxyz(order)
+    at = (_IDENTITY_WXYZ if wxyz else _IDENTITY) if pose is None else pose
+    arrays, single = _core.signed_distance(tree, points, at, max_distance, budget, threads, wxyz)
+    return SignedDistances(*(x[0] for x in arrays)) if single else SignedDistances(*arrays)
+
+
+def contains(
+    tree: Tree, points: ArrayLike, pose: ArrayLike | None = None, *, threads: int = 1, order: Order = "xyzw"
+) -> Any:
+    """Which of N points are in a body? Sooner than :func:`signed_distance`, whose verdict it returns.
+
+    Parameters
+    ----------
+    tree, points, pose, threads, order
+        As for :func:`signed_distance`.
+
+    Returns
+    -------
+    uint8 array of shape (N,), or a Verdict for a single point
+        ``SEPARATED``: outside, certainly.
+    """
+    wxyz = _is_wxyz(order)
+    at = (_IDENTITY_WXYZ if wxyz else _IDENTITY) if pose is None else pose
+    found = _core.contains(tree, points, at, threads, wxyz)
     return _VERDICTS[found] if isinstance(found, int) else found
 
 

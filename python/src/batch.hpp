@@ -29,9 +29,10 @@ inline int thread_count(nb::handle threads) {
     return count == 0 ? oneapi::tbb::info::default_concurrency() : count;
 }
 
-/// Calls query(i, context) for all i < count; in any order, if there are several threads. Holds the interpreter's lock
-/// before and after, and not in between. Throws what a signal handler raises; what was not done then stays undone.
-template <class Query> void for_all(size_t count, int threads, const Query& query) {
+/// Calls work(begin, end, context) for ranges that make up 0 ... count - 1; in any order, if there are several threads.
+/// Holds the interpreter's lock before and after, and not in between. Throws what a signal handler raises; what was not
+/// done then stays undone.
+template <class Work> void for_ranges(size_t count, int threads, const Work& work) {
     using Clock = std::chrono::steady_clock;
     using namespace std::chrono_literals;
     std::optional<nb::gil_scoped_release> released(std::in_place);
@@ -44,12 +45,11 @@ template <class Query> void for_all(size_t count, int threads, const Query& quer
         if (arena)
             arena->execute([&] {
                 oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<size_t>(begin, end, 16), [&](const auto& range) {
-                    QueryContext& context = thread_context();
-                    for (size_t i = range.begin(); i < range.end(); ++i) query(i, context);
+                    work(range.begin(), range.end(), thread_context());
                 });
             });
         else
-            for (size_t i = begin; i < end; ++i) query(i, thread_context());
+            work(begin, end, thread_context());
         begin = end;
         const auto took = Clock::now() - start;
         if (took < 50ms) slice *= 2;
@@ -59,6 +59,13 @@ template <class Query> void for_all(size_t count, int threads, const Query& quer
         if (PyErr_CheckSignals() != 0) throw nb::python_error();
         released.emplace();
     }
+}
+
+/// Calls query(i, context) for all i < count, as for_ranges() does.
+template <class Query> void for_all(size_t count, int threads, const Query& query) {
+    for_ranges(count, threads, [&query](size_t begin, size_t end, QueryContext& context) {
+        for (size_t i = begin; i < end; ++i) query(i, context);
+    });
 }
 
 } // namespace prolate::python

@@ -38,16 +38,6 @@ Quaternion product(const Quaternion& a, const Quaternion& b) noexcept {
         a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
 }
 
-bool holds_floats(const DoublePose& pose) noexcept {
-    const auto is_float = [](double x) { return static_cast<double>(static_cast<float>(x)) == x; };
-    return std::all_of(std::begin(pose.t), std::end(pose.t), is_float) &&
-           std::all_of(std::begin(pose.q), std::end(pose.q), is_float);
-}
-Pose to_floats(const DoublePose& pose) noexcept {
-    const auto f = [](double x) { return static_cast<float>(x); };
-    return {{f(pose.t[0]), f(pose.t[1]), f(pose.t[2])}, {f(pose.q[0]), f(pose.q[1]), f(pose.q[2]), f(pose.q[3])}};
-}
-
 std::string at_index(const char* name, bool single, size_t i) {
     return single ? std::string(name) : std::string(name) + "[" + std::to_string(i) + "]";
 }
@@ -81,6 +71,16 @@ void take_sevens(const double* from, size_t count, bool wxyz, std::vector<Double
 }
 
 } // namespace
+
+bool holds_floats(const DoublePose& pose) noexcept {
+    const auto is_float = [](double x) { return static_cast<double>(static_cast<float>(x)) == x; };
+    return std::all_of(std::begin(pose.t), std::end(pose.t), is_float) &&
+           std::all_of(std::begin(pose.q), std::end(pose.q), is_float);
+}
+Pose to_floats(const DoublePose& pose) noexcept {
+    const auto f = [](double x) { return static_cast<float>(x); };
+    return {{f(pose.t[0]), f(pose.t[1]), f(pose.t[2])}, {f(pose.q[0]), f(pose.q[1]), f(pose.q[2]), f(pose.q[3])}};
+}
 
 Point transformed(const DoublePose& pose, const Point& p) noexcept {
     const Point r = rotated(pose, p);

@@ -22,6 +22,10 @@ struct DoublePose {
 };
 using Point = std::array<double, 3>;
 
+/// Are all its numbers floats?
+bool holds_floats(const DoublePose& pose) noexcept;
+Pose to_floats(const DoublePose& pose) noexcept;
+
 Point transformed(const DoublePose& pose, const Point& p) noexcept;
 Point rotated(const DoublePose& pose, const Point& v) noexcept;
 /// transpose(R) v.

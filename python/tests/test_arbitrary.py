@@ -72,6 +72,8 @@ def test_queries(cover, box_a):
         survive(lambda: prolate.contacts(a, pa, b, pb, **limits))
         survive(lambda: prolate.sweep(a, pa, draw(poses), b, pb, draw(poses), **limits))
         survive(lambda: prolate.raycast(a, pa, draw(points), draw(points), draw(numbers), budget=1000))
+        survive(lambda: prolate.signed_distance(a, draw(points), pa, budget=1000, max_distance=draw(numbers)))
+        survive(lambda: prolate.contains(a, draw(points), pa))
         survive(lambda: prolate.bounds(a, pa, margin=draw(numbers)))
         survive(lambda: prolate.collide(a, pa, b, pb, threads=draw(numbers), order=draw(st.text(max_size=4))))
 
@@ -100,6 +102,17 @@ def test_shapes(box_a):
 def test_pairs(radii, at, pairs, number):
     survive(lambda: prolate.pairs.collide(radii, at, pairs, margin=number))
     survive(lambda: prolate.pairs.distance([1, 2, 3], at, [[0, 0]], tolerance=number))
+
+
+@SETTINGS
+@given(points, numbers, numbers, faces)
+def test_primitives(row, radius, height, triangles):
+    survive(lambda: prolate.box_tree(row))
+    survive(lambda: prolate.ellipsoid_tree(row))
+    survive(lambda: prolate.cylinder_tree(radius, height))
+    survive(lambda: prolate.sphere_tree(radius))
+    survive(lambda: prolate.convex_tree(row, triangles))
+    survive(lambda: prolate.convex_tree(np.random.default_rng(0).normal(size=(5, 3)), triangles))
 
 
 def test_world(box_a):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import prolate
-from conftest import HALF_A, HALF_B, IDENTITY, box_gap, matrix, poses
+from conftest import HALF_A, HALF_B, IDENTITY, box_gap, box_mesh, matrix, poses
 from prolate import Verdict
 
 
@@ -197,6 +197,83 @@ def test_overlap_with_shapes(box_a):
     far = np.array([1e7, 0, 0])
     touching = prolate.overlap(box_a, IDENTITY + [1e7, 0, 0, 0, 0, 0, 0], prolate.Sphere(far + [1.5, 0, 0], 0.5 - 1e-5))
     assert touching == Verdict.SEPARATED
+
+
+def box_distance(half, local):
+    """Signed distance from a box."""
+    q = np.abs(local) - half
+    return np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(axis=-1), 0)
+
+
+@pytest.mark.parametrize("far", [0.0, 1e7])
+def test_signed_distances_are_those_of_boxes(box_a, far):
+    rng = np.random.default_rng(14)
+    at = poses(rng, 1, 1.0)[0]
+    at[0] += far
+    local = rng.normal(size=(2000, 3)) * 1.2
+    m = matrix(at)
+    world = local @ m[:3, :3].T + m[:3, 3]
+    local = (world - m[:3, 3]) @ m[:3, :3]  # of the points as rounded to float64
+    truth = box_distance(HALF_A, local)
+    found = prolate.signed_distance(box_a, world, at, threads=2)
+    assert (found.lower <= truth + 1e-12 + 1e-15 * far).all() and (found.upper >= truth - 1e-12 - 1e-15 * far).all()
+    assert (found.upper - found.lower < 1e-5).all()
+    assert (found.verdict[truth > 1e-6] == Verdict.SEPARATED).all()
+    assert (found.verdict[truth < 0] == Verdict.OVERLAPPING).all()
+    assert np.allclose(np.linalg.norm(found.point - world, axis=1), np.abs(truth), atol=1e-6 + 1e-9 * far)
+    outside = truth > 1e-3
+    away = (world - found.point)[outside] / truth[outside, None]
+    assert np.allclose(away, found.gradient[outside], atol=1e-2)
+    sides = prolate.contains(box_a, world, at)
+    assert (sides == found.verdict).all()
+    assert prolate.contains(box_a, [0, 0, 0]) is Verdict.OVERLAPPING
+    assert prolate.signed_distance(box_a, [0, 0, 0]).upper == pytest.approx(-HALF_A[2])
+    with pytest.raises(ValueError, match=r"points\[1\]"):
+        prolate.contains(box_a, [[0, 0, 0], [0, np.inf, 0]])
+
+
+def test_points_far_beyond_float32_are_never_called_outside(box_a):
+    """Inside by less than what float32 would move them."""
+    rng = np.random.default_rng(15)
+    for pose in poses(rng, 20, 1e4):
+        m = matrix(pose)
+        local = rng.uniform(-0.9, 0.9, (50, 3)) * HALF_A
+        local[:, 0] = HALF_A[0] - 1e-9
+        world = local @ m[:3, :3].T + m[:3, 3]
+        assert (prolate.contains(box_a, world, pose) == Verdict.OVERLAPPING).all()
+        assert (prolate.signed_distance(box_a, world, pose).verdict == Verdict.OVERLAPPING).all()
+
+
+def test_primitives_are_what_they_are_called(box_a, box_b):
+    rng = np.random.default_rng(16)
+    box = prolate.box_tree(HALF_A)
+    at = poses(rng, 300, 0.9)
+    assert (prolate.collide(box, IDENTITY, box_b, at) == prolate.collide(box_a, IDENTITY, box_b, at)).all()
+    points = rng.uniform(-1, 1, (3000, 3))
+    round_ = np.hypot(points[:, 0], points[:, 1])
+    in_cylinder = (round_ <= 0.5) & (np.abs(points[:, 2]) <= 0.7)
+    found = prolate.contains(prolate.cylinder_tree(0.5, 0.7), points)
+    assert (found[in_cylinder] == Verdict.OVERLAPPING).all()
+    assert (found[(round_ > 0.5025) | (np.abs(points[:, 2]) > 0.7001)] == Verdict.SEPARATED).all()
+    for tree, radii in (
+        (prolate.ellipsoid_tree([0.9, 0.5, 0.2]), [0.9, 0.5, 0.2]),
+        (prolate.sphere_tree(0.6), [0.6] * 3),
+    ):
+        radial = np.linalg.norm(points / radii, axis=1)
+        found = prolate.contains(tree, points)
+        assert (found[radial <= 1] == Verdict.OVERLAPPING).all()
+        assert (found[radial > 1.001] == Verdict.SEPARATED).all()
+    corners, faces = box_mesh(HALF_B)
+    convex = prolate.convex_tree(corners, faces)
+    assert (prolate.collide(box_a, IDENTITY, convex, at) == prolate.collide(box_a, IDENTITY, box_b, at)).all()
+    with pytest.raises(ValueError, match="half"):
+        prolate.box_tree([1, 0, 1])
+    with pytest.raises(ValueError, match="radius"):
+        prolate.sphere_tree(-1)
+    with pytest.raises(ValueError, match="faces"):
+        prolate.convex_tree(corners, faces + 1)
+    with pytest.raises(prolate.Error, match="faces"):
+        prolate.convex_tree(corners, faces[:-1])
 
 
 def test_bounds_hold_the_body(box_a):
