@@ -72,7 +72,7 @@ nb::object as_numpy(nb::handle value, const char* name, const char* dtype) {
 
 AnyArray import_array(nb::handle value) noexcept {
     AnyArray out;
-    if (!nb::ndarray_check(value) || !nb::try_cast<AnyArray>(value, out, false)) {
+    if (!nb::try_cast<AnyArray>(value, out, false)) {
         PyErr_Clear();
         return {};
     }

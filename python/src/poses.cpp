@@ -16,11 +16,10 @@ constexpr double kMost = std::numeric_limits<float>::max();
 
 using Quaternion = std::array<double, 4>;
 
+// Of doubles whose squares stay in range: check() lets nothing else through.
 Quaternion unit(const double (&q)[4]) noexcept {
-    const double most = std::max({std::abs(q[0]), std::abs(q[1]), std::abs(q[2]), std::abs(q[3])});
-    const Quaternion s = {q[0] / most, q[1] / most, q[2] / most, q[3] / most};
-    const double length = std::sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3]);
-    return {s[0] / length, s[1] / length, s[2] / length, s[3] / length};
+    const double scale = 1 / std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    return {q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale};
 }
 
 Point turned(const Quaternion& q, const Point& v) noexcept {
@@ -139,6 +138,9 @@ void Poses::take_matrices(const double* entries, const char* name) {
 void Poses::check(const char* name) const {
     for (size_t i = 0; i < count_; ++i) {
         const DoublePose pose = at(i);
+        const auto& [t, q] = pose;
+        const double squares = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+        if (std::abs(t[0]) + std::abs(t[1]) + std::abs(t[2]) <= kMost && squares > 1e-30 && squares <= kMost) continue;
         const auto fits = [](double x) { return std::abs(x) <= kMost; }; // false for NaN
         if (!std::all_of(std::begin(pose.t), std::end(pose.t), fits) ||
             !std::all_of(std::begin(pose.q), std::end(pose.q), fits))
@@ -180,14 +182,22 @@ RoundedPose in_frame(const DoublePose& frame, const DoublePose& body, double rea
     const DoublePose exact{{t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}};
     const Pose pose = to_floats(exact);
     const auto square = [](double x) { return x * x; };
-    const double moved = std::sqrt(square(t[0] - pose.translation.x) + square(t[1] - pose.translation.y) +
-                                   square(t[2] - pose.translation.z));
-    const double bent = std::sqrt(square(q[0] - pose.rotation.x) + square(q[1] - pose.rotation.y) +
-                                  square(q[2] - pose.rotation.z) + square(q[3] - pose.rotation.w));
+    const double moved =
+        square(t[0] - pose.translation.x) + square(t[1] - pose.translation.y) + square(t[2] - pose.translation.z);
+    const double bent = square(q[0] - pose.rotation.x) + square(q[1] - pose.rotation.y) +
+                        square(q[2] - pose.rotation.z) + square(q[3] - pose.rotation.w);
     // A unit quaternion that is off by `bent`, and made one again, turns by another angle of at most 2 bent (1 + bent).
     // The last term is more than what double precision loses above.
-    const double distance = std::sqrt(square(d[0]) + square(d[1]) + square(d[2]));
-    return {pose, 1.0001 * (moved + 2 * bent * reach) + 0x1p-46 * (distance + reach)};
+    const double lengths = std::abs(d[0]) + std::abs(d[1]) + std::abs(d[2]) + reach;
+    return {pose, 1.0001 * (std::sqrt(moved) + 2 * std::sqrt(bent) * reach) + 0x1p-46 * lengths};
+}
+
+bool far_apart(const Poses& a, double reach_a, const Poses& b, double reach_b, double margin, size_t i) noexcept {
+    if (a.floats() && b.floats()) return false;
+    const DoublePose pose_a = a.at(i), pose_b = b.at(i);
+    const double x = pose_b.t[0] - pose_a.t[0], y = pose_b.t[1] - pose_a.t[1], z = pose_b.t[2] - pose_a.t[2];
+    const double near = (reach_a + reach_b + margin) * (1 + 1e-12);
+    return x * x + y * y + z * z > near * near;
 }
 
 PlacedBodies place(const Poses& a, double reach_a, const Poses& b, double reach_b, size_t i) noexcept {

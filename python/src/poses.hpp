@@ -72,6 +72,10 @@ struct PlacedBodies {
 /// reach: no point of the body is farther from its origin.
 PlacedBodies place(const Poses& a, double reach_a, const Poses& b, double reach_b, size_t i) noexcept;
 
+/// Are bodies of doubles so far apart that spheres around their origins tell? Then collide() says separated, too: its
+/// spheres lie in these, and it allows for less rounding.
+bool far_apart(const Poses& a, double reach_a, const Poses& b, double reach_b, double margin, size_t i) noexcept;
+
 /// The pose of `body` in `frame`, rounded, and by how much that moves a point at `reach`.
 struct RoundedPose {
     Pose pose;

@@ -45,6 +45,9 @@ struct Bodies {
           poses_b(at_b, "poses_b", wxyz), count(broadcast(poses_a, "poses_a", poses_b, "poses_b")) {}
 
     bool single() const noexcept { return poses_a.single() && poses_b.single(); }
+    bool far_apart(size_t i, double margin) const noexcept {
+        return python::far_apart(poses_a, a.reach, poses_b, b.reach, margin, i);
+    }
     PlacedBodies placed(size_t i) const noexcept { return place(poses_a, a.reach, poses_b, b.reach, i); }
 };
 
@@ -53,6 +56,7 @@ nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
     const Bodies bodies(a, poses_a, b, poses_b, wxyz);
     const Limits limits(margin, max_level, budget);
     const auto verdict_of = [&](size_t i, QueryContext& context) {
+        if (limits.budget > 0 && bodies.far_apart(i, limits.margin)) return static_cast<uint8_t>(Verdict::separated);
         const PlacedBodies at = bodies.placed(i);
         return static_cast<uint8_t>(
             collide(bodies.a.view, at.a, bodies.b.view, at.b, context, limits.options(at.slack)).verdict);
