@@ -5,6 +5,7 @@
 #include "builder/cover.hpp"
 #include "builder/effort.hpp"
 #include "builder/exact.hpp"
+#include "builder/fill.hpp"
 #include "builder/grow.hpp"
 #include "builder/hausdorff.hpp"
 #include "builder/hulls.hpp"
@@ -21,6 +22,8 @@
 #include <cmath>
 #include <mutex>
 #include <new>
+#include <optional>
+#include <utility>
 
 namespace prolate {
 namespace {
@@ -46,15 +49,30 @@ private:
     Result<Build> run(MeshView input) {
         auto cleaned = clean(input, options_.weld);
         if (!cleaned) return cleaned.error();
-        report_ = cleaned->report;
-        mesh_ = cleaned->mesh.view();
+        source_ = std::move(*cleaned);
+        report_ = source_.report;
+        mesh_ = source_.mesh.view();
+        source_hash_ = hash(mesh_);
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
+        if (auto possible = check_lengths(); !possible) return possible.error();
+        closed_ = report_.closed;
         return options_.exact ? bake_exact() : bake_ellipsoids();
     }
 
     // Voxelise, grow, quantise, measure, prove.
     Result<Build> bake_ellipsoids() {
         report("voxelise", 0, 0);
+        if (options_.fill > 0) {
+            filled_ = fill(mesh_, double{options_.fill});
+            mesh_ = filled_.view();
+            closed_ = true;
+        }
+        if (options_.keep_holes > 0) {
+            passages_.emplace(mesh_, double{options_.keep_holes});
+            if (!passages_->any())
+                return Error{ErrorCode::bad_options,
+                             "no such ball passes a hole of the mesh; give a smaller keep_holes", 0};
+        }
         const Winding winding(mesh_);
         resolution_ = effort_.resolution;
         Pieces pieces = cut_pieces(mesh_, closed(), winding, expected_leaves(options_), resolution_,
@@ -68,8 +86,9 @@ private:
         std::vector<format::PackedLevel> levels;
         if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
         std::vector<LevelReport> figures = measure(grown, columns, winding, levels);
-        return finish(Tree::open(format::encode(describe(grown.goal_reached), options_.degree, lattice_, levels)),
-                      std::move(figures), grown.goal_reached);
+        const bool reached = grown.goal_reached && (!passages_ || hole_radius_ >= double{options_.keep_holes});
+        return finish(Tree::open(format::encode(describe(reached), options_.degree, lattice_, levels)),
+                      std::move(figures), reached);
     }
 
     // Split the triangles, bound them, prove.
@@ -104,6 +123,7 @@ private:
         return Build{.tree = std::move(*tree),
                      .mesh = report_,
                      .levels = std::move(figures),
+                     .hole_radius = hole_radius_,
                      .solid_volume = solid_.value,
                      .solid_volume_error = solid_.error,
                      .mass = mass_,
@@ -112,6 +132,24 @@ private:
                      .surface_mode = !closed(),
                      .goal_reached = goal_reached,
                      .seconds = seconds_since(start_)};
+    }
+
+    // Are the lengths that are asked for in range, for this mesh?
+    Result<void> check_lengths() const {
+        const double side = box_.size().maxCoeff();
+        const BallRange range = ball_range(side);
+        if (most_distance() < least_clearance(box_.size().norm(), options_.quality) * (1 - 1e-6))
+            return Error{ErrorCode::bad_options,
+                         "the clearance or distance is finer than distances are measured; "
+                         "ask for at least 0.01 % of the diagonal, with quality fast 0.1 %",
+                         0};
+        for (const float radius : {options_.fill, options_.keep_holes})
+            if (radius > 0 && (double{radius} < range.least || double{radius} > range.most))
+                return Error{ErrorCode::bad_options,
+                             "the ball of fill or keep_holes is too small or too large for this mesh; "
+                             "its radius may be 1/64 to 1/2 of the longest side of the mesh's box",
+                             0};
+        return {};
     }
 
     // Can what is asked be done with this solid?
@@ -172,7 +210,13 @@ private:
         const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
         return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
     }
-    bool closed() const { return report_.closed; }
+    bool closed() const { return closed_; }
+    // The leaves' largest distance from the solid that is asked for, metres; HUGE_VAL: none is.
+    double most_distance() const {
+        const double share = 0.01 * double{options_.distance} * box_.size().norm();
+        return std::min(options_.distance > 0 ? share : HUGE_VAL,
+                        options_.clearance > 0 ? double{options_.clearance} : HUGE_VAL);
+    }
     // A volume as a share of the solid's.
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 
@@ -197,7 +241,8 @@ private:
         return grow(solid, {.build = options_,
                             .effort = effort_,
                             .min_radius = min_radius(),
-                            .diagonal = box_.size().norm(),
+                            .most_distance = most_distance(),
+                            .passages = passages_ ? &*passages_ : nullptr,
                             .progress = progress});
     }
 
@@ -228,7 +273,7 @@ private:
 
     BakeInfo describe(bool goal_reached) const {
         BakeInfo info;
-        info.source_hash = hash(mesh_);
+        info.source_hash = source_hash_;
         info.options_hash = hash(options_);
         info.surface_mode = !closed();
         info.exact = options_.exact;
@@ -244,14 +289,17 @@ private:
         info.alpha = options_.alpha;
         info.beta = options_.beta;
         info.tolerance = options_.tolerance;
-        info.distance = options_.distance;
-        const bool asked =
-            options_.levels || options_.ellipsoids || options_.tolerance > 0 || options_.distance > 0 || options_.exact;
+        const bool has_distance = most_distance() < HUGE_VAL;
+        info.distance = has_distance ? static_cast<float>(100 * most_distance() / info.diagonal) : 0;
+        const bool asked = options_.levels || options_.ellipsoids || options_.tolerance > 0 || has_distance ||
+                           options_.keep_holes > 0 || options_.exact;
         info.levels = asked ? options_.levels : 3;
         info.ellipsoids = options_.ellipsoids;
         info.seed = options_.seed;
         info.placement = mesh_.placement;
         info.weld = options_.weld;
+        info.fill = options_.fill;
+        info.keep_holes = options_.keep_holes;
         info.resolution = resolution_;
         return info;
     }
@@ -284,6 +332,10 @@ private:
             figure.seconds = seconds_since(start) + (l < grown.seconds.size() ? grown.seconds[l] : 0);
             levels[l].figures = figure;
             figures.push_back(figure);
+            if (passages_ && l + 1 == levels.size()) {
+                const double beyond = passages_->needed() - double{options_.keep_holes};
+                hole_radius_ = std::max(0.0, passages_->nearest(cut).distance - beyond);
+            }
         }
         return figures;
     }
@@ -314,7 +366,7 @@ private:
                 return true;
             };
         const auto start = Clock::now();
-        const auto proof = verify(tree, mesh_, options);
+        const auto proof = verify(tree, source_.mesh.view(), options);
         if (!proof) return proof.error();
         if (!proof->bounded)
             return Error{ErrorCode::internal, "a bounding volume could not be proved; please report this mesh",
@@ -340,8 +392,14 @@ private:
     std::mutex reporting_;
     BuildProgress reached_{"clean", 0, 0};
 
-    MeshView mesh_;
+    CleanMesh source_;
+    uint64_t source_hash_ = 0;
+    Mesh filled_;   // if that is asked for
+    MeshView mesh_; // what bounds the solid: either of these
     MeshReport report_;
+    bool closed_ = false;
+    std::optional<Passages> passages_;
+    double hole_radius_ = 0;
     Box box_;
     uint32_t resolution_ = 0;
     Quadrature solid_; // its volume; 0 where there is no inside

@@ -18,6 +18,7 @@ constexpr double kLeastGain = 0.999; // a level must bring the outside volume do
 constexpr int kRounds = 12;             // at most
 constexpr uint32_t kFirstCount = 8;     // to try
 constexpr double kMet = 0.999;          // of a limit: quantisation will add a little
+constexpr double kBlocked = 8;          // an excess, of a passage that is not free at all
 constexpr double kCountTolerance = 1.1; // it ends this close to the least count
 
 class Grower {
@@ -30,11 +31,13 @@ public:
         FlatSet root = sets_.single();
         end_level();
         const BuildOptions& goal = options_.build;
-        if (goal.ellipsoids)
-            grow_upwards(root, exactly(goal.ellipsoids, [this](double done) { report(done); }));
-        else if (goal.tolerance > 0 || goal.distance > 0)
+        if (goal.tolerance > 0 || options_.most_distance < HUGE_VAL || options_.passages) {
             grow_upwards(root, meet_limits(root));
-        else
+        } else if (goal.ellipsoids) {
+            const FlatSet leaves = exactly(goal.ellipsoids, [this](double done) { report(done); });
+            grown_.goal_reached = leaves.parts.size() == goal.ellipsoids;
+            grow_upwards(root, leaves);
+        } else
             grow_levels(std::move(root), goal.levels ? goal.levels : kDefaultLevels);
         return std::move(grown_);
     }
@@ -113,24 +116,27 @@ private:
         if (count == 1) return sets_.single();
         FlatSet set = sets_.make(count, nullptr, progress);
         sets_.split(set, count);
-        if (set.parts.size() < count) grown_.goal_reached = false;
         return set;
     }
 
     // How far the cover is from what was asked: above 1, not there yet.
     double excess(const FlatSet& set) const {
-        const BuildOptions& goal = options_.build;
+        const double tolerance = double{options_.build.tolerance};
         double out = 0;
-        if (goal.tolerance > 0) out = set.outside / solid_.columns.volume().value / goal.tolerance;
-        if (goal.distance > 0)
-            out = std::max(out, solid_.distance(ellipsoids_of(fits_of(set.parts))) /
-                                    (0.01 * goal.distance * options_.diagonal));
+        if (tolerance > 0) out = set.outside / solid_.columns.volume().value / tolerance;
+        if (options_.most_distance < HUGE_VAL)
+            out = std::max(out, solid_.distance(ellipsoids_of(fits_of(set.parts))) / options_.most_distance);
+        if (const Passages* const passages = options_.passages)
+            out = std::max(out, std::min(kBlocked, passages->needed() /
+                                                       passages->nearest(ellipsoids_of(fits_of(set.parts))).distance));
         return out;
     }
 
-    // The fewest leaves that meet the limits, to about a tenth: errors fall about like a power of the count.
+    // The fewest leaves that meet the limits, to about a tenth: errors fall about like a power of the count. If as many
+    // as there may be do not meet them, those.
     FlatSet meet_limits(const FlatSet& root) {
-        uint32_t low = 1, count = kFirstCount; // low: known to be too few
+        const uint32_t most = options_.build.ellipsoids ? options_.build.ellipsoids : kMaxLeaves;
+        uint32_t low = 1, count = std::min(kFirstCount, most); // low: known to be too few
         double low_excess = excess(root);
         if (low_excess <= kMet) return root;
         std::optional<FlatSet> best;
@@ -143,7 +149,7 @@ private:
                 best = std::move(set);
                 if (count <= low * kCountTolerance + 1) return *best;
             } else if (best ? count * kCountTolerance >= static_cast<double>(best->parts.size())
-                            : count == kMaxLeaves || set.parts.size() < count) {
+                            : count == most || set.parts.size() < count) {
                 if (best) return *best;
                 grown_.goal_reached = false;
                 return set;
@@ -152,8 +158,7 @@ private:
                 std::clamp(std::log(low_excess / now) / std::log(static_cast<double>(count) / low), 0.4, 1.5);
             if (!met) low = count, low_excess = now;
             const double guess = low * std::pow(low_excess / (0.97 * kMet), 1 / steepness);
-            const double limit =
-                best ? static_cast<double>(best->parts.size()) - 1 : std::min<double>(kMaxLeaves, low * 8.0);
+            const double limit = best ? static_cast<double>(best->parts.size()) - 1 : std::min<double>(most, low * 8.0);
             count = static_cast<uint32_t>(std::clamp(std::ceil(guess), low + 1.0, std::max(low + 1.0, limit)));
         }
         if (best) return *best;

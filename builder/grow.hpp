@@ -8,6 +8,7 @@
 
 #include "builder/flat_set.hpp"
 #include "builder/grown.hpp"
+#include "builder/passages.hpp"
 
 #include <functional>
 #include <vector>
@@ -18,7 +19,10 @@ struct GrowOptions {
     BuildOptions build;
     Effort effort;
     double min_radius; ///< metres
-    double diagonal;   ///< of the mesh's box, metres
+    /// The leaves' largest distance from the solid, metres; HUGE_VAL: whatever it is.
+    double most_distance;
+    /// That the leaves have to leave free, or null.
+    const Passages* passages;
     /// Called now and then with the share of the work done and the number of nodes.
     std::function<void(double, uint32_t)> progress;
 };

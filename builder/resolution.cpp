@@ -24,8 +24,11 @@ uint32_t finer(uint32_t resolution, double times) {
 } // namespace
 
 double expected_leaves(const BuildOptions& options) {
-    if (options.ellipsoids) return options.ellipsoids;
-    if (options.tolerance > 0 || options.distance > 0) return kLeavesOfLimits;
+    const bool has_limit =
+        options.tolerance > 0 || options.distance > 0 || options.clearance > 0 || options.keep_holes > 0;
+    if (options.ellipsoids)
+        return has_limit ? std::min<double>(options.ellipsoids, kLeavesOfLimits) : options.ellipsoids;
+    if (has_limit) return kLeavesOfLimits;
     return std::min(std::pow(double(options.degree), options.levels ? options.levels : 3u), kMostLeaves);
 }
 

@@ -20,9 +20,12 @@
 // Shares no data with the bake: other boxes, other inside test (dipole tree instead of columns).
 //
 // An exact tree says which triangles each node stands for, and verify_exact.cpp takes it by its word.
+#include <prolate/build.hpp>
 #include <prolate/verify.hpp>
 
+#include "builder/fill.hpp"
 #include "builder/job.hpp"
+#include "builder/passages.hpp"
 #include "builder/prover.hpp"
 #include "builder/verify_bounding.hpp"
 #include "builder/verify_exact.hpp"
@@ -102,13 +105,34 @@ LevelProof prove_level(const std::vector<CoverNode>& shapes, const std::vector<P
     return total;
 }
 
+// Can the balls that the tree speaks of be told of this mesh?
+bool suits(const BakeInfo& info, MeshView mesh) {
+    Box box;
+    for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
+    const BallRange range = ball_range(box.size().maxCoeff());
+    for (const float radius : {info.fill, info.keep_holes})
+        if (radius > 0 && !(double{radius} >= range.least && double{radius} <= range.most)) return false;
+    return true;
+}
+
 Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::function<void(double)>& progress) {
     auto cleaned = clean(mesh, tree.bake_info().weld);
     if (!cleaned) return cleaned.error();
-    const MeshView surface = cleaned->mesh.view();
+    MeshView surface = cleaned->mesh.view();
+    const BakeInfo info = tree.bake_info();
+    if (!suits(info, surface))
+        return Error{ErrorCode::bad_mesh,
+                     "the ball of the tree's fill or keep_holes is too small or too large for this mesh; "
+                     "name the mesh that the tree was baked from",
+                     0};
+    Mesh filled;
+    if (info.fill > 0) {
+        filled = fill(surface, double{info.fill});
+        surface = filled.view();
+    }
 
     VerifyReport report;
-    report.surface_mode = !cleaned->report.closed;
+    report.surface_mode = !cleaned->report.closed && info.fill == 0;
     if (tree.has_triangles()) {
         verify_exact(tree, surface, report);
         return report;
@@ -139,6 +163,15 @@ Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::f
         if (l == 0 && proof.covered) // the root holds everything: no need to ask it again
             for (CoverNode& shape : all)
                 if (shape.parent == &all[0]) shape.parent = nullptr;
+    }
+    if (info.keep_holes > 0 && !tree.is_prefix()) {
+        std::vector<Ellipsoid> leaves;
+        tree.for_each_in_cut(tree.level_count() - 1, [&](uint32_t node) { leaves.push_back(tree.ellipsoid(node)); });
+        const Passages passages(surface, double{info.keep_holes});
+        const Passages::Nearest nearest = passages.nearest(leaves);
+        report.holes_kept = nearest.distance >= passages.needed();
+        std::copy_n(nearest.place.data(), 3, report.blocked);
+        report.covered = report.covered && report.holes_kept;
     }
     return report;
 }

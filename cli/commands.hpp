@@ -21,6 +21,7 @@ void add_info(CLI::App& app, Work& chosen);
 void add_verify(CLI::App& app, Work& chosen);
 void add_export(CLI::App& app, Work& chosen);
 void add_collide(CLI::App& app, Work& chosen);
+void add_compare(CLI::App& app, Work& chosen);
 void add_render(CLI::App& app, Work& chosen);
 void add_view(CLI::App& app, Work& chosen);
 void add_completion(CLI::App& app, Work& chosen);

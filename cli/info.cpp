@@ -93,6 +93,9 @@ std::string as_text(const std::string& name, const TreeView& tree) {
         out += fmt::format("  covers    {} of volume {:.6g} (+/- {:.0e}), diagonal {:.6g}\n",
                            info.exact ? "the surface of a solid" : "a solid", info.solid_volume,
                            info.solid_volume * double{info.solid_volume_error}, info.diagonal);
+    if (info.fill > 0)
+        out += fmt::format("  filled    what a ball of radius {:g} cannot reach from outside is part of the solid\n",
+                           info.fill);
     if (info.mass.volume > 0) out += mass_text(info.mass);
     if (const auto& [x, y, z] = info.placement.scale; info.placement.scale != Placement{}.scale)
         out += fmt::format("  scale     the mesh's file times {:g}, {:g}, {:g}\n", x, y, z);
@@ -106,10 +109,14 @@ std::string as_text(const std::string& name, const TreeView& tree) {
                            name_of(info.method), name_of(info.primitive), name_of(info.quality), info.alpha, info.beta,
                            info.seed, info.resolution);
     if (info.levels > 0) out += fmt::format("  asked     {} levels below the root\n", info.levels);
-    if (info.ellipsoids > 0) out += fmt::format("  asked     {} leaves\n", grouped(info.ellipsoids));
+    const bool at_most = info.tolerance > 0 || info.distance > 0 || info.keep_holes > 0;
+    if (info.ellipsoids > 0)
+        out += fmt::format("  asked     {}{} leaves\n", at_most ? "at most " : "", grouped(info.ellipsoids));
     if (info.tolerance > 0) out += fmt::format("  asked     outside ratio of at most {:g}\n", info.tolerance);
     if (info.distance > 0)
-        out += fmt::format("  asked     distance of at most {:g} % of the diagonal\n", info.distance);
+        out += fmt::format("  asked     distance of at most {:g} % of the diagonal ({:.3g})\n", info.distance,
+                           0.01 * double{info.distance} * info.diagonal);
+    if (info.keep_holes > 0) out += fmt::format("  asked     holes free for a ball of radius {:g}\n", info.keep_holes);
     if (!info.goal_reached) out += "  missed    what was asked could not be met at this resolution\n";
     out += fmt::format("  hashes    source {:016x}, options {:016x}\n", info.source_hash, info.options_hash);
     out += level_table(tree);

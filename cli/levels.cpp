@@ -109,7 +109,9 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["asked"] = {{"levels", info.levels},
                     {"ellipsoids", info.ellipsoids},
                     {"tolerance", shortest(info.tolerance)},
-                    {"distance", shortest(info.distance)}};
+                    {"distance", shortest(info.distance)},
+                    {"keep_holes", shortest(info.keep_holes)}};
+    out["fill"] = shortest(info.fill);
     out["goal_reached"] = info.goal_reached;
     out["source_hash"] = fmt::format("{:016x}", info.source_hash);
     out["options_hash"] = fmt::format("{:016x}", info.options_hash);

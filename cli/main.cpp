@@ -95,6 +95,7 @@ Outcome<ExitCode> run(std::vector<std::string> words) {
     add_verify(app, chosen);
     add_export(app, chosen);
     add_collide(app, chosen);
+    add_compare(app, chosen);
     add_render(app, chosen);
     add_view(app, chosen);
     add_completion(app, chosen);

@@ -3,27 +3,20 @@
 #include "cli/console.hpp"
 #include "cli/grouped.hpp"
 #include "cli/inputs.hpp"
+#include "cli/length.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <utility>
 
 namespace prolate::cli {
-namespace {
-
-constexpr std::pair<const char*, double> kUnits[] = {
-    {"mm", 0.001}, {"cm", 0.01}, {"m", 1}, {"in", 0.0254}, {"ft", 0.3048}};
-
-} // namespace
 
 void declare_mesh_options(CLI::App& app, MeshOptions& options, bool tree) {
     const std::string unless = tree ? " (default: as the tree was baked)" : "";
     std::vector<std::string> names;
-    for (const auto& [name, metres] : kUnits) names.emplace_back(name);
+    for (const LengthUnit& unit : length_units()) names.emplace_back(unit.name);
     app.add_option("--unit", options.unit,
                    "unit of the mesh's file: mm, cm, m, in or ft; coordinates become metres" + unless)
         ->check(CLI::IsMember(names));
@@ -39,9 +32,7 @@ Outcome<ImportOptions> import_options(const MeshOptions& options, const std::opt
     const bool says_nothing = options.unit.empty() && options.scale.empty() && !options.recentre;
     if (placement && says_nothing) return placed_as(*placement);
     ImportOptions out;
-    const auto named = [&options](const auto& unit) { return options.unit == unit.first; };
-    if (const auto unit = std::find_if(std::begin(kUnits), std::end(kUnits), named); unit != std::end(kUnits))
-        out.unit = unit->second;
+    if (const LengthUnit* const unit = find_length_unit(options.unit)) out.unit = unit->metres;
     const auto sound = [](double s) { return std::isfinite(s) && s != 0; };
     if (options.scale.size() == 2 || !std::all_of(options.scale.begin(), options.scale.end(), sound))
         return Failure{kUsage, "--scale", "must be one number or three, none of them 0", "write it as 0.001 or 1,1,-1"};

@@ -22,7 +22,8 @@ constexpr const char* kFooter = R"(
 The proof uses only the tree's file and the mesh. Exit code 0: every level covers. 1: some level does not, or it
 could not be proved. The mesh is read as when the tree was baked, with the same unit, scale, local origin and weld
 tolerance, unless you give others. An open mesh has no certain inside, so only its triangles are proved to be
-covered. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it.
+covered. Of a tree baked with --fill, the filled solid is; of one with --keep-holes, the holes are proved to be free,
+too. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it.
 
 Examples:
   prolate verify horse.etree horse.obj
@@ -43,6 +44,8 @@ std::string as_json(const VerifyReport& report, bool same_mesh) {
     out["same_triangles"] = report.exact ? nlohmann::ordered_json(report.same_mesh) : nullptr;
     out["bounded"] = report.exact ? nullptr : nlohmann::ordered_json(report.bounded);
     if (!report.bounded) out["unbounded_node"] = report.unbounded_node;
+    out["holes_kept"] = report.holes_kept;
+    if (!report.holes_kept) out["blocked_at"] = report.blocked;
     out["baked_from_this_mesh"] = same_mesh;
     out["levels"] = nlohmann::ordered_json::array();
     for (const LevelProof& level : report.levels) {
@@ -83,6 +86,9 @@ std::string as_text(const VerifyReport& report) {
             fmt::format("node {}: its bounding volume does NOT hold all ellipsoids below it, so queries may miss them; "
                         "bake again\n",
                         report.unbounded_node);
+    if (!report.holes_kept)
+        out += fmt::format("holes: NOT certainly free for the ball around ({:.9g}, {:.9g}, {:.9g})\n",
+                           report.blocked[0], report.blocked[1], report.blocked[2]);
     if (report.surface_mode) out += "surface mode: the mesh is open, so the proof is about its triangles only\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;

@@ -115,6 +115,7 @@ void store_header(std::byte* h, const BakeInfo& info, uint32_t degree, const Lat
         store_le(h + kAtMeshOrigin + 8 * i, info.placement.origin[i]);
     }
     store_le(h + kAtWeld, info.weld);
+    store_le(h + kAtBall, info.keep_holes > 0 ? -info.keep_holes : info.fill);
     const auto mass = std::bit_cast<std::array<double, kMassNumbers>>(info.mass);
     for (size_t i = 0; i < kMassNumbers; ++i) store_le(h + kAtMass + sizeof(double) * i, mass[i]);
 }

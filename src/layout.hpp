@@ -53,7 +53,7 @@ enum HeaderOffset : size_t {
     kAtScale = 144,
     kAtMeshOrigin = 168,
     kAtWeld = 192,
-    kAtReserved2 = 196,
+    kAtBall = 196,
     kAtMass = 200, // volume, center, inertia, errors: kMassNumbers doubles
     kHeaderBytes = 304,
 };

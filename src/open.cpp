@@ -114,7 +114,7 @@ Result<void> check_header(std::span<const std::byte> bytes) {
             return bad("origin of the mesh out of range", kAtMeshOrigin + 8 * i);
     }
     if (!std::isfinite(load_le<float>(h + kAtWeld))) return bad("option out of range", kAtWeld);
-    if (!all_zero(h + kAtReserved2, kAtMass - kAtReserved2)) return bad("reserved bytes are not zero", kAtReserved2);
+    if (!std::isfinite(load_le<float>(h + kAtBall))) return bad("option out of range", kAtBall);
     if (const auto mass = check_mass(h); !mass) return mass;
     return check_triangle_counts(h, (flags & kExact) != 0);
 }

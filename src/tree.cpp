@@ -5,6 +5,7 @@
 #include "src/format.hpp"
 #include "src/layout.hpp"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -93,7 +94,9 @@ BakeInfo TreeView::bake_info() const noexcept {
             .seed = load_le<uint64_t>(h + kAtSeed),
             .resolution = load_le<uint32_t>(h + kAtResolution),
             .placement = placement,
-            .weld = load_le<float>(h + kAtWeld)};
+            .weld = load_le<float>(h + kAtWeld),
+            .fill = std::max(0.0f, load_le<float>(h + kAtBall)),
+            .keep_holes = std::max(0.0f, -load_le<float>(h + kAtBall))};
 }
 
 bool TreeView::is_node(uint32_t slot) const noexcept {

@@ -1,7 +1,9 @@
 #include "cli/bake/asset.hpp"
 
+#include "cli/bake/goals.hpp"
 #include "cli/console.hpp"
 #include "cli/inputs.hpp"
+#include "cli/length.hpp"
 #include "cli/levels.hpp"
 #include "cli/progress_line.hpp"
 #include "cli/signals.hpp"
@@ -11,6 +13,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <tuple>
 #include <utility>
 
 #include <fcntl.h>
@@ -68,6 +71,7 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
                 return std::move(*baked);
             }
     }
+    if (const auto possible = check_lengths(a, *options, mesh->view()); !possible) return possible.error();
     auto built = [&] {
         ProgressLine line(label);
         return build(mesh->view(), *options,
@@ -76,7 +80,7 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     if (built && interrupted()) built = Error{ErrorCode::cancelled};
     if (!built) return failure_of(a.mesh, built.error());
     describe_mesh(a.mesh, built->mesh, options->exact);
-    Baked baked{Source::baked, std::move(built->tree), built->mesh, {}};
+    Baked baked{Source::baked, std::move(built->tree), built->mesh, {}, built->hole_radius};
     for (const LevelReport& level : built->levels) baked.level_seconds.push_back(level.seconds);
     return baked;
 }
@@ -91,10 +95,16 @@ void declare_asset_options(CLI::App& app, Asset& a) {
                    "join vertices of open edges within this length, if that closes the mesh (default: 8 float steps)");
     app.add_option("--degree", a.options.degree, "children of a node, 2 ... 64")->capture_default_str();
     app.add_option("--levels", a.levels, "levels below the root, 1 ... 31");
-    app.add_option("--ellipsoids", a.ellipsoids, "number of leaves, 1 ... 65536: the best set of that many");
+    app.add_option("--ellipsoids", a.ellipsoids,
+                   "number of leaves, 1 ... 65536: the best set of that many; with a closeness: at most that many");
     app.add_option("--tolerance", a.tolerance, "outside volume of the leaves / volume of the solid, above 0");
     app.add_option("--distance", a.distance,
                    "largest distance of the leaves from the solid, % of the diagonal, above 0");
+    app.add_option("--clearance", a.clearance,
+                   "largest distance of the leaves from the solid, as a length: 5mm, 0.2in (mm, cm, m, in, ft)");
+    app.add_option("--keep-holes", a.keep_holes,
+                   "a ball of this radius passes the leaves wherever a somewhat larger one passes the mesh: 8mm");
+    app.add_option("--fill", a.fill, "what a ball of this radius cannot reach from outside counts as solid: 20mm");
     app.add_option("--method", a.method, "how outside volumes are found: voxel or analytic")->capture_default_str();
     app.add_option("--primitive", a.primitive, "what the nodes are: ellipsoid or sphere")->capture_default_str();
     app.add_option("--alpha", a.options.alpha, "weight of the surface error")->capture_default_str();
@@ -152,6 +162,16 @@ Outcome<BuildOptions> options_of(const Asset& a) {
     options.ellipsoids = a.ellipsoids.value_or(0);
     options.tolerance = a.tolerance.value_or(0);
     options.distance = a.distance.value_or(0);
+    const std::tuple<const char*, const std::string&, float&> lengths[] = {
+        {"--clearance", a.clearance, options.clearance},
+        {"--keep-holes", a.keep_holes, options.keep_holes},
+        {"--fill", a.fill, options.fill}};
+    for (const auto& [option, text, metres] : lengths) {
+        if (text.empty()) continue;
+        const auto length = read_length(option, text);
+        if (!length) return length.error();
+        metres = static_cast<float>(length->metres);
+    }
     if (const auto valid = validate(options); !valid) return failure_of("bake", valid.error());
     return options;
 }
@@ -171,10 +191,10 @@ Outcome<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cac
     const auto start = Clock::now();
     auto baked = make(a, cache, rebake, label);
     if (!baked) return baked;
-    if (!baked->tree.view().bake_info().goal_reached)
-        note(a.mesh,
-             "the number, tolerance or distance asked for was not reached at this resolution; try --quality best");
+    if (const auto close = check_closeness(a, *baked); !close) return close.error();
     cache.keep(baked->tree.view(), baked->source == Source::baked);
+    if (!baked->tree.view().bake_info().goal_reached)
+        note(a.mesh, "the number asked for was not reached at this resolution; try --quality best");
     if (baked->source == Source::unchanged) {
         // For make and its like, which go by dates. Whose file it is not may not do so, and loses nothing but that.
         ::utimensat(AT_FDCWD, a.output.c_str(), nullptr, 0);

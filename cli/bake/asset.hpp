@@ -27,6 +27,7 @@ struct Asset {
     std::string method = "voxel", primitive = "ellipsoid", quality = "normal";
     std::optional<uint32_t> levels, ellipsoids;
     std::optional<float> tolerance, distance;
+    std::string clearance, fill, keep_holes; ///< lengths with their units
     MeshOptions mesh_options;
     BuildOptions options;
 };
@@ -48,6 +49,7 @@ struct Baked {
     Tree tree;
     std::optional<MeshReport> diagnosis; ///< unless nobody had to look at the mesh
     std::vector<double> level_seconds;   ///< by level, if baked
+    double hole_radius = 0;              ///< as in Build, if baked
     double seconds = 0;                  ///< all in all
 };
 

@@ -101,7 +101,7 @@ std::string set_options(const Json& values, Asset& asset) {
 }
 
 // The keys that exclude each other: how far the tree goes.
-constexpr const char* kGoals[] = {"levels", "ellipsoids", "tolerance", "distance", "exact"};
+constexpr const char* kGoals[] = {"levels", "ellipsoids", "tolerance", "distance", "clearance", "keep-holes", "exact"};
 
 // The defaults, overridden by the entry.
 Json merged(Json defaults, const Json& entry) {

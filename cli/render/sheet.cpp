@@ -43,12 +43,13 @@ struct Panel {
 // All that is drawn, and what it is drawn from.
 struct Stage {
     Frame frame;
-    Box box; // of the mesh, or if there is none, of what is shown
-    std::vector<float> growth;
-    std::unique_ptr<Solid> solid;    // if needed
-    std::unique_ptr<MeshScene> mesh; // if shown
-    std::list<CutScene> cuts;        // of the levels to show
-    std::vector<dvec3> colours;      // by slots
+    Box box;                              // of the mesh, or if there is none, of what is shown
+    std::list<std::vector<float>> growth; // of each tree, node_growth()
+    std::unique_ptr<Solid> solid;         // if needed
+    std::unique_ptr<MeshScene> mesh;      // if shown
+    std::list<CutScene> cuts;             // of the levels to show
+    std::list<MeshScene> surfaces;        // of covers that are no tree
+    std::vector<dvec3> colours;           // by slots
     std::optional<HeatScale> heat;
     std::vector<Panel> panels;
 };
@@ -91,6 +92,10 @@ Layout choose_layout(uint32_t panels, uint32_t width, uint32_t height, const Win
 std::string caption_of(const TreeView& tree, uint32_t level, size_t nodes) {
     const char* shape = tree.bake_info().primitive == Primitive::sphere ? "sphere" : "ellipsoid";
     return fmt::format("level {}: {} {}{}", level, grouped(nodes), shape, nodes == 1 ? "" : "s");
+}
+
+std::string caption_of(MeshView mesh) {
+    return fmt::format("mesh, {} triangles", grouped(mesh.triangles.size()));
 }
 
 std::string ratio_of(const TreeView& tree, uint32_t level) {
@@ -178,16 +183,25 @@ void paste(Sheet& sheet, const PanelImage& image, uint32_t left, uint32_t top) {
         }
 }
 
-Result<void> check(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
-    const auto bad = [](const char* what, uint64_t where) { return Error{ErrorCode::bad_options, what, where}; };
+Error bad(const char* what, uint64_t where) {
+    return {ErrorCode::bad_options, what, where};
+}
+
+// What any sheet needs.
+Result<void> check_picture(const SheetOptions& o) {
     for (const uint32_t side : {o.width, o.height})
         if (side < kSmallestCell || side > 8192) return bad("a picture's side is not 96 ... 8192 pixels", side);
     if (o.samples < 16 || o.samples > 1024) return bad("samples a pixel are not 16 ... 1024", o.samples);
+    if (!(std::abs(o.view.elevation) <= 89)) return bad("the elevation is not -89 ... 89 degrees", 0);
+    if (!(std::abs(o.view.azimuth) <= 3600)) return bad("the azimuth is not -3600 ... 3600 degrees", 0);
+    return {};
+}
+
+Result<void> check(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
+    if (auto checked = check_picture(o); !checked) return checked;
     if (o.levels.empty()) return bad("no level to show", 0);
     for (const uint32_t level : o.levels)
         if (level >= tree.level_count()) return bad("the tree has no such level", level);
-    if (!(std::abs(o.view.elevation) <= 89)) return bad("the elevation is not -89 ... 89 degrees", 0);
-    if (!(std::abs(o.view.azimuth) <= 3600)) return bad("the azimuth is not -3600 ... 3600 degrees", 0);
     if (o.section && o.section->axis > 2) return bad("a section's axis is not 0, 1 or 2", o.section->axis);
     if (o.section && !(o.section->at >= 0 && o.section->at <= 1)) return bad("a section is not at 0 ... 1", 0);
     if (!(o.heat_top >= 0 && o.heat_top <= 1e6)) return bad("the top of the heat scale is not 0 ... 1e6 percent", 0);
@@ -215,12 +229,25 @@ Paint plain_paint(const Stage& stage) {
     };
 }
 
-Paint heat_paint(const Stage& stage) {
-    return [&stage, neutral = to_linear_rgb(kNeutral), percent = 100 / stage.solid->diagonal()](const Hit& hit,
-                                                                                                const dvec3& at) {
-        if (hit.id == kMeshId) return neutral;
+// Of a `surface`, there is no mesh that is to be neutral.
+Paint heat_paint(const Stage& stage, bool surface = false) {
+    return [&stage, surface, neutral = to_linear_rgb(kNeutral),
+            percent = 100 / stage.solid->diagonal()](const Hit& hit, const dvec3& at) {
+        if (hit.id == kMeshId && !surface) return neutral;
         return stage.heat->colour(stage.solid->outside_distance(at / stage.frame.scale + stage.frame.center) * percent);
     };
+}
+
+void add_growth(Stage& stage, const TreeView& tree) {
+    node_growth(tree, stage.growth.emplace_back(tree.slot_count()));
+}
+
+PanelContent& add_panel(Stage& stage, const Scene& scene, std::string caption, const Paint& paint) {
+    Panel& panel = stage.panels.emplace_back();
+    panel.caption = std::move(caption);
+    panel.content.scene = &scene;
+    panel.content.paint = paint;
+    return panel.content;
 }
 
 std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
@@ -237,24 +264,16 @@ std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, c
         if (o.heat || o.section) stage->solid = std::make_unique<Solid>(mesh->mesh.view(), mesh->report.closed);
     }
     stage->frame = shown.frame();
-    stage->growth.resize(tree.slot_count());
-    node_growth(tree, stage->growth);
+    add_growth(*stage, tree);
     if (mesh_shown) stage->mesh = std::make_unique<MeshScene>(mesh->mesh.view(), stage->frame, stage->solid.get());
     for (const Oklch& colour : node_colours(tree)) stage->colours.push_back(to_linear_rgb(colour));
 
     const Paint paint = o.heat ? heat_paint(*stage) : plain_paint(*stage);
-    const auto add_panel = [&](const Scene& scene, std::string caption) -> PanelContent& {
-        Panel& panel = stage->panels.emplace_back();
-        panel.caption = std::move(caption);
-        panel.content.scene = &scene;
-        panel.content.paint = paint;
-        return panel.content;
-    };
     if (mesh_shown && o.mesh_style == MeshStyle::beside)
-        add_panel(*stage->mesh, fmt::format("mesh, {} triangles", grouped(mesh->mesh.triangles.size())));
+        add_panel(*stage, *stage->mesh, caption_of(mesh->mesh.view()), paint);
     double most = 0;
     for (const uint32_t level : o.levels) {
-        stage->cuts.emplace_back(tree, level, stage->growth, stage->frame);
+        stage->cuts.emplace_back(tree, level, stage->growth.back(), stage->frame);
         std::string caption = caption_of(tree, level, stage->cuts.back().size());
         if (o.heat) {
             const Figures figures = figures_of(tree, level, *mesh, *stage->solid);
@@ -263,7 +282,7 @@ std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, c
         } else {
             caption += ratio_of(tree, level);
         }
-        PanelContent& content = add_panel(stage->cuts.back(), std::move(caption));
+        PanelContent& content = add_panel(*stage, stage->cuts.back(), std::move(caption), paint);
         if (o.heat) content.relief = kHeatRelief;
         content.see_through = o.mesh_style == MeshStyle::overlay;
         if (content.see_through || o.section) content.mesh = stage->mesh.get();
@@ -275,14 +294,44 @@ std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, c
     return stage;
 }
 
-} // namespace
+// The mesh, and the leaves of each tree and each surface.
+std::unique_ptr<Stage> make_stage(std::span<const CoverPanel> covers, const CleanMesh& mesh, const SheetOptions& o) {
+    auto stage = std::make_unique<Stage>();
+    stage->solid = std::make_unique<Solid>(mesh.mesh.view(), mesh.report.closed);
+    stage->box.add(mesh.mesh.view());
+    Box shown = stage->box;
+    double most = 0;
+    std::vector<Ellipsoid> leaves;
+    const auto leaf_level = [](const CoverPanel& cover) { return cover.tree.level_count() - 1; };
+    for (const CoverPanel& cover : covers) {
+        shown.add(cover.surface);
+        if (!cover.surface.triangles.empty()) continue;
+        cover.tree.for_each_in_cut(leaf_level(cover), [&](uint32_t node) { shown.add(cover.tree.ellipsoid(node)); });
+        const LevelInfo level = cover.tree.level(leaf_level(cover));
+        most = std::max(most, 100 * (mesh.report.closed ? level.hausdorff_max : level.hausdorff_p99) /
+                                  stage->solid->diagonal());
+    }
+    stage->frame = shown.frame();
+    stage->heat = {o.heat_top > 0 ? o.heat_top : HeatScale::round_up(most), !mesh.report.closed};
+    stage->mesh = std::make_unique<MeshScene>(mesh.mesh.view(), stage->frame);
+    add_panel(*stage, *stage->mesh, caption_of(mesh.mesh.view()), heat_paint(*stage));
+    for (const CoverPanel& cover : covers) {
+        const bool surface = !cover.surface.triangles.empty();
+        const Scene* scene = nullptr;
+        if (surface) {
+            scene = &stage->surfaces.emplace_back(cover.surface, stage->frame);
+        } else {
+            add_growth(*stage, cover.tree);
+            scene = &stage->cuts.emplace_back(cover.tree, leaf_level(cover), stage->growth.back(), stage->frame);
+        }
+        add_panel(*stage, *scene, cover.caption, heat_paint(*stage, surface)).relief = kHeatRelief;
+    }
+    return stage;
+}
 
-Result<Sheet> render_sheet(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
-    if (auto checked = check(tree, mesh, o); !checked) return checked.error();
+Result<Sheet> draw(const std::unique_ptr<Stage>& stage, const SheetOptions& o) {
     const auto font = Font::open();
     if (!font) return font.error();
-    const std::unique_ptr<Stage> stage = make_stage(tree, mesh, o);
-
     PanelSettings s;
     s.camera = make_camera(o.view);
     s.up = up_vector(o.view.up);
@@ -327,6 +376,20 @@ Result<Sheet> render_sheet(const TreeView& tree, const CleanMesh* mesh, const Sh
     }
     if (stage->heat) draw_legend(sheet, *font, *stage->heat, legend_text, upper + layout.rows * layout.cell_height);
     return sheet;
+}
+
+} // namespace
+
+Result<Sheet> render_sheet(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& options) {
+    if (auto checked = check(tree, mesh, options); !checked) return checked.error();
+    return draw(make_stage(tree, mesh, options), options);
+}
+
+Result<Sheet> render_covers(std::span<const CoverPanel> covers, const CleanMesh& mesh, const SheetOptions& options) {
+    if (auto checked = check_picture(options); !checked) return checked.error();
+    SheetOptions whole = options;
+    whole.section.reset();
+    return draw(make_stage(covers, mesh, whole), whole);
 }
 
 } // namespace prolate::cli

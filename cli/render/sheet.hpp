@@ -6,10 +6,14 @@
 #include "cli/render/image.hpp"
 
 #include <prolate/error.hpp>
+#include <prolate/mesh.hpp>
+#include <prolate/tree.hpp>
 
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 namespace prolate::cli {
@@ -46,5 +50,17 @@ struct SheetOptions {
 /// Renders the sheet: `mesh`, if there is one and it is to be seen beside, then each level's cut. The same input gives
 /// the same pixels for any number of threads. Fails with bad_options, cancelled, or io if no font is installed.
 Result<Sheet> render_sheet(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& options);
+
+/// One of several covers of a mesh on a sheet.
+struct CoverPanel {
+    TreeView tree;       ///< whose leaves are shown, ...
+    MeshView surface;    ///< ... or this closed surface, if it is not empty
+    std::string caption; ///< parts behind a ", " may go into a second line
+};
+
+/// Renders the mesh and each cover, coloured by how far it sticks out of the mesh, with a legend for all. Of `options`,
+/// levels, mesh_style, section and heat are not looked at. The same input gives the same pixels for any number of
+/// threads. Fails with bad_options, cancelled, or io if no font is installed.
+Result<Sheet> render_covers(std::span<const CoverPanel> covers, const CleanMesh& mesh, const SheetOptions& options);
 
 } // namespace prolate::cli

@@ -26,7 +26,7 @@ struct BakeInfo {
     bool surface_mode = false; ///< the mesh was open: only its triangles are certain to be covered
     bool exact = false;        ///< an exact tree: the triangles are stored, and the nodes cover only them
     bool proved = false;       ///< every level was proved to cover, after quantisation, before the file was written
-    bool goal_reached = true;  ///< false: the asked count, tolerance or distance could not be met
+    bool goal_reached = true;  ///< false: the asked count or closeness could not be met
     /// Cubic metres, by the columns that all ratios are measured with; mass.volume is more exact. 0 where there is no
     /// inside, and of exact trees of open meshes.
     double solid_volume = 0;
@@ -38,13 +38,15 @@ struct BakeInfo {
     Quality quality = Quality::normal;
     float alpha = 0, beta = 0; ///< weights of E_sur^3 and E_vol (paper, eq. 3)
     float tolerance = 0;       ///< asked outside ratio
-    float distance = 0;        ///< asked Hausdorff distance, in % of the diagonal
+    float distance = 0;        ///< asked Hausdorff distance (BuildOptions' distance or clearance), % of the diagonal
     uint32_t levels = 0;       ///< asked levels below the root
-    uint32_t ellipsoids = 0;   ///< asked leaves
+    uint32_t ellipsoids = 0;   ///< asked leaves; with a closeness, the most
     uint64_t seed = 0;         ///< of the random numbers
     uint32_t resolution = 0;   ///< voxels along the longest side of the mesh's box
     Placement placement;       ///< of the mesh in the frame of its file: answers are relative to its origin
     float weld = -1;           ///< asked tolerance for vertices that nearly meet, metres; below 0: the default
+    float fill = 0;            ///< radius of the ball, metres: what it cannot reach from outside counts as solid
+    float keep_holes = 0;      ///< radius of the ball, metres, that passes the leaves where the mesh has holes
 };
 
 /// How close the cut at one level is to the mesh, as measured on the decoded nodes when it was baked. Lengths in

@@ -16,19 +16,36 @@ namespace prolate {
 
 /// Options of build(). The defaults are a sound choice.
 ///
-/// What ends the tree is one of four goals: a number of levels, a number of ellipsoids, a closeness (tolerance,
-/// distance or both), or, with `exact`, the mesh's own triangles. 0 means "not asked"; if nothing is asked, levels = 3.
+/// What ends the tree is one of four goals: a number of levels, a number of ellipsoids, a closeness (one or several of
+/// tolerance, distance, clearance and keep_holes), or, with `exact`, the mesh's own triangles. A number of ellipsoids
+/// and a closeness together mean: at most that many, and fewer if they are close enough. 0 means "not asked"; if
+/// nothing is asked, levels = 3.
 struct BuildOptions {
     uint32_t degree = 8; ///< most children of a node, 2 ... kMaxDegree
 
-    uint32_t levels = 0;     ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more would gain nothing
-    uint32_t ellipsoids = 0; ///< number of leaves, 1 ... 65536: the best set of exactly that many, with a tree above it
+    uint32_t levels = 0; ///< levels below the root, 1 ... kMaxLevels - 1; fewer where more would gain nothing
+    /// Number of leaves, 1 ... 65536: the best set of exactly that many, with a tree above it. With a closeness: the
+    /// most that there may be.
+    uint32_t ellipsoids = 0;
     /// Largest outside ratio of the leaves (LevelFigures::outside_ratio), above 0. As few leaves as reach it, with a
     /// tree above them.
     float tolerance = 0;
     /// Largest Hausdorff distance of the leaves from the solid (LevelFigures::hausdorff_max), above 0, in % of the
     /// diagonal of the mesh's box. As few leaves as reach it, with a tree above them.
     float distance = 0;
+    /// The same limit as a length, metres, above 0. The smaller of the two counts. See least_clearance().
+    float clearance = 0;
+    /// Radius of a ball, metres, above 0. Through each hole of the mesh that a somewhat larger ball passes (by a
+    /// seventh of its radius, or by 1/110 of the box's longest side if that is more), one of this radius passes the
+    /// leaves, too, and between parts likewise. This is proved. As few leaves as leave so much free, with a tree above
+    /// them. Not with `fill`. See ball_range().
+    float keep_holes = 0;
+    /// Radius of a ball, metres, above 0. What such a ball cannot reach from outside without touching the mesh counts
+    /// as solid, so that an open mesh has an inside, too. The filled solid leaves out nothing of it and sticks out by
+    /// about two cells; these are 1/160 of the box's longest side or 1/40 of the radius, whichever is larger, and
+    /// at most an eighth more. All figures are then about the filled solid. 0: only what the mesh encloses is inside.
+    /// See ball_range().
+    float fill = 0;
     /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, weld and threads then matter.
     bool exact = false;
     uint32_t leaf_triangles = 4; ///< most triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
@@ -46,9 +63,21 @@ struct BuildOptions {
 /// Checks that the options are in range and go together. Fails with bad_options or unsupported. Thread-safe.
 Result<void> validate(const BuildOptions& options);
 
+/// The least clearance, metres, that a bake can be asked for: distances are measured no finer (a `distance` of 0.01,
+/// with Quality::fast of 0.1). `diagonal` is that of the mesh's box, metres. Thread-safe.
+double least_clearance(double diagonal, Quality quality) noexcept;
+
+/// The radii, metres, that `fill` and `keep_holes` may have, for a mesh whose box is `longest_side` metres along its
+/// longest side. Thread-safe.
+struct BallRange {
+    double least; ///< finer gaps cannot be told
+    double most;  ///< larger balls are larger than the mesh
+};
+BallRange ball_range(double longest_side) noexcept;
+
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It rises whenever the same file and options give
 /// other bytes, so that no cache takes an old bake for a new one.
-inline constexpr uint32_t kBuilderVersion = 11;
+inline constexpr uint32_t kBuilderVersion = 12;
 
 /// Hash of everything except the mesh that determines the bytes: the options (without `threads`), kBuilderVersion and
 /// kFormatVersion. With hash(MeshView) of the cleaned mesh it makes the key of a cache of bakes. BakeInfo holds both.
@@ -85,8 +114,11 @@ struct Build {
     double diagonal = 0;             ///< of the mesh's bounding box, metres
     uint32_t resolution = 0;         ///< voxels along the box's longest side
     bool surface_mode = false;       ///< the mesh is open: see build()
-    bool goal_reached = true; ///< false: the asked count, tolerance or distance could not be met at this resolution
-    double seconds = 0;       ///< wall time
+    /// False: the asked count or closeness could not be met at this resolution, or not with so few. Then `levels` tells
+    /// how close the tree comes, which is as close as could be.
+    bool goal_reached = true;
+    double hole_radius = 0; ///< of keep_holes: that of the ball that does pass the leaves, up to about 4 times it
+    double seconds = 0;     ///< wall time
 };
 
 /// Smallest semi-axis of a node: this part of its longest one, ...
@@ -106,7 +138,8 @@ inline constexpr double kThinnestNodeOfPlace = 0x1p-21;
 /// With `levels`, each level is optimised by itself. The leaves have at most about 1.3 times the outside volume of the
 /// best set of as many `ellipsoids` (of the union's volume, if the mesh encloses nothing).
 ///
-/// Fails with bad_options, unsupported, bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
+/// Fails with bad_options (also for a closeness below least_clearance(), or a ball beyond ball_range()), unsupported,
+/// bad_mesh, cancelled, out_of_memory, or internal. Thread-safe.
 Result<Build> build(MeshView mesh, const BuildOptions& options = {}, const ProgressCallback& progress = {});
 
 } // namespace prolate

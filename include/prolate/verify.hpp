@@ -21,13 +21,17 @@ struct LevelProof {
 
 /// Result of verify().
 struct VerifyReport {
-    bool covered = false;  ///< every level is covered, and `bounded` holds
+    bool covered = false;  ///< every level is covered, `bounded` and `holes_kept` hold
     bool exact = false;    ///< the tree holds triangles
     bool same_mesh = true; ///< of an exact tree: its triangles are the mesh's. If not, no level counts as covered.
     /// Of a tree without triangles: each bounding volume holds all that lies below its node. If not, queries may
     /// overlook some of it, and `unbounded_node` is the first node whose bounding volume fails.
     bool bounded = true;
     uint32_t unbounded_node = 0;
+    /// Of a whole tree that was baked with `keep_holes`: a ball of that radius passes the leaves wherever one that is
+    /// larger by a seventh passes the mesh. If not, the ball whose center is `blocked` is not certainly free.
+    bool holes_kept = true;
+    double blocked[3] = {};
     bool surface_mode = false;      ///< the mesh is open: the proof is about its triangles, there is no inside
     std::vector<LevelProof> levels; ///< the root first
 };
@@ -45,13 +49,16 @@ struct VerifyOptions {
 /// tree; since an ellipsoid is convex, everything in between does, too. Levels are proved one by one, because each is a
 /// cover by itself. The bounding volumes, by which queries cull, are proved to hold all ellipsoids below.
 ///
+/// Of a tree that was baked with `fill`, the solid is the filled one: all that such a ball cannot reach.
+///
 /// The mesh is given as it was read. It is welded as when the tree was baked, and points that this moves are proved
 /// where they were. A point of the solid in no node ends the proof as a counterexample; a cell that cannot be decided
 /// at 1e-9 of the mesh's size ends it as "not proved".
 ///
 /// Of an exact tree, the triangles are compared with the mesh's, and each must lie in all ellipsoids above it. A prefix
 /// of one is proved to cover the triangles, as in surface mode. Queries descend by its nodes, so there each part must
-/// lie in a node and in all nodes above it. Thread-safe. Fails with bad_mesh or cancelled.
+/// lie in a node and in all nodes above it. Thread-safe. Fails with bad_mesh (also if the ball of
+/// the tree's fill or keep_holes does not suit this mesh, see ball_range()) or cancelled.
 Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options = {});
 
 } // namespace prolate

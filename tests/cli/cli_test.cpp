@@ -262,6 +262,14 @@ TEST_F(Cli, WrongUsageIsOneLineWithAHint) {
     expect_failure(bake_with({"--tolerance", "0"}), 2, "--tolerance", "above 0");
     expect_failure(bake_with({"--tolerance", "nan"}), 2, "bake", "tolerance");
     expect_failure(bake_with({"--levels", "2", "--tolerance", "0.1"}), 2, "bake", "only one");
+    expect_failure(bake_with({"--clearance", "5"}), 2, "--clearance", "has no unit");
+    expect_failure(bake_with({"--clearance", "5parsec"}), 2, "--clearance", "no unit 'parsec'");
+    expect_failure(bake_with({"--clearance", "0mm"}), 2, "--clearance", "not above 0");
+    expect_failure(bake_with({"--fill", "-2in"}), 2, "--fill", "not above 0");
+    expect_failure(bake_with({"--keep-holes", "wide"}), 2, "--keep-holes", "no length");
+    expect_failure(bake_with({"--clearance", "1%"}), 2, "--clearance", "--distance 1");
+    expect_failure(bake_with({"--fill", "1m", "--keep-holes", "1m"}), 2, "bake", "only one");
+    expect_failure(bake_with({"--exact", "--fill", "1m"}), 2, "bake", "exact");
     expect_failure(bake_with({"--alpha", "-1"}), 2, "bake", "alpha");
     expect_failure(bake_with({"--quality", "superb"}), 2, "--quality", "fast, normal or best");
     expect_failure(bake_with({"--method", "guess"}), 2, "--method", "no such method");
@@ -271,6 +279,65 @@ TEST_F(Cli, WrongUsageIsOneLineWithAHint) {
     expect_failure(bake_with({"--report", out}), 2, out, "is the output");
     expect_failure(run({"bake", mesh, "-o", mesh}), 2, mesh, "is the mesh");
     EXPECT_TRUE(listing().empty());
+}
+
+// ---- lengths ----
+
+// The peanut's box is 4 m long, 4.5 m in diagonal or so.
+TEST_F(Cli, WhatCannotBeHadIsRefusedWithTheNearestThatCan) {
+    const auto bake_with = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"bake", shared("peanut.obj"), "-o", file("out.etree"), "--quality", "fast", "-q"});
+        return run(more);
+    };
+    expect_failure(bake_with({"--clearance", "0.1mm"}), 2, "--clearance", "the least is 4.");
+    expect_failure(bake_with({"--distance", "0.01"}), 2, "--distance", "the least is 0.1");
+    expect_failure(bake_with({"--fill", "9m"}), 2, "--fill",
+                   "too large for a mesh whose longest side is 4m; the largest is 2m");
+    expect_failure(bake_with({"--keep-holes", "1mm"}), 2, "--keep-holes", "the least is 62.5mm");
+    const std::string mesh = shared("peanut.obj");
+    const Outcome few = bake_with({"--ellipsoids", "2", "--clearance", "5cm"});
+    expect_failure(few, 1, mesh, "at most 2 ellipsoids reach a clearance of ");
+    EXPECT_NE(few.err.find("cm instead of 5cm; the nearest that can be had is --clearance "), std::string::npos);
+    EXPECT_TRUE(listing().empty());
+    // What it says can be had, can.
+    const size_t at = few.err.find("--clearance ") + 12;
+    const std::string nearest = few.err.substr(at, few.err.find(',', at) - at);
+    const Outcome met = bake_with({"--ellipsoids", "2", "--clearance", nearest});
+    EXPECT_EQ(met.code, 0) << met.err;
+    expect_failure(bake_with({"--keep-holes", "20cm"}), 2, mesh, "no such ball passes a hole");
+}
+
+TEST_F(Cli, ALengthIsMetWithAsFewAsNeeded) {
+    const std::string out = file("out.etree");
+    const Outcome baked = run({"bake", shared("peanut.obj"), "-o", out, "--quality", "fast", "--ellipsoids", "64",
+                               "--clearance", "20cm", "--json"});
+    ASSERT_EQ(baked.code, 0) << baked.err;
+    const Json report = Json::parse(baked.out);
+    EXPECT_TRUE(report["goal_reached"]);
+    EXPECT_LE(report["levels"].back()["hausdorff_max"], 0.2);
+    EXPECT_LT(report["levels"].back()["nodes"], 64);
+    EXPECT_GT(report["levels"].back()["nodes"], 1);
+    const std::string info = run({"info", out}).out;
+    EXPECT_NE(info.find("asked     at most 64 leaves"), std::string::npos) << info;
+    EXPECT_NE(info.find("% of the diagonal (0.2)"), std::string::npos) << info;
+}
+
+TEST_F(Cli, AFilledTreeSaysSoAndIsVerified) {
+    // A cube without its upper side: a box that a ball of half its width does not get into.
+    Mesh open = box_mesh(4, [](double x, double y, double z) {
+        return Vec3{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+    });
+    std::erase_if(open.triangles, [&](const Triangle& t) {
+        return open.vertices[t[0]].z + open.vertices[t[1]].z + open.vertices[t[2]].z == 3;
+    });
+    const std::string mesh = file("open.obj", obj_text(open)), out = file("out.etree");
+    const Outcome baked = run({"bake", mesh, "-o", out, "--quality", "fast", "--levels", "1", "--fill", "100cm"});
+    ASSERT_EQ(baked.code, 0) << baked.err;
+    EXPECT_NE(run({"info", out}).out.find("filled    what a ball of radius 1 cannot reach"), std::string::npos);
+    EXPECT_EQ(Json::parse(run({"info", out, "--json"}).out)["fill"], 1);
+    const Outcome verified = run({"verify", out, mesh});
+    EXPECT_EQ(verified.code, 0) << verified.out << verified.err;
+    EXPECT_EQ(verified.out.find("surface mode"), std::string::npos);
 }
 
 // ---- writing ----

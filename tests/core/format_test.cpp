@@ -350,6 +350,17 @@ TEST(Format, FlagsDecodeByThemselves) {
     }
 }
 
+TEST(Format, ABallFillsOrPasses) {
+    for (const auto& [fill, keep_holes] : {std::pair{0.25f, 0.0f}, {0.0f, 0.25f}, {0.0f, 0.0f}}) {
+        BakeInfo info = golden_info();
+        info.fill = fill, info.keep_holes = keep_holes;
+        const Bytes bytes = format::encode(info, 3, kGoldenLattice, golden_levels());
+        const BakeInfo read_back = TreeView::open(bytes)->bake_info();
+        EXPECT_EQ(read_back.fill, fill);
+        EXPECT_EQ(read_back.keep_holes, keep_holes);
+    }
+}
+
 // The places of a block's numbers, as vector code loads them.
 TEST(Format, ABlockIsAStructureOfArrays) {
     const Bytes bytes = golden_exact();
@@ -593,7 +604,7 @@ TEST(Format, NamesTheFirstOffence) {
         {160, {0, 0, 0, 0, 0, 0, 0xf8, 0x7f}, ErrorCode::bad_file, 160},  // a scale that is no number
         {184, {0, 0, 0, 0, 0, 0, 0xf0, 0x7f}, ErrorCode::bad_file, 184},  // an infinite mesh origin
         {192, {0, 0, 0x80, 0x7f}, ErrorCode::bad_file, 192},              // an infinite weld
-        {196, {1}, ErrorCode::bad_file, 196},                             // reserved
+        {196, {0, 0, 0x80, 0xff}, ErrorCode::bad_file, 196},              // an infinite ball
         {kTable, {1}, ErrorCode::bad_file, kTable},                       // first block of level 0
         {kTable + 4, {2}, ErrorCode::bad_file, kTable + 4},               // two roots
         {kTable + kRow + 4, {0}, ErrorCode::bad_file, kTable + kRow + 4}, // an empty level
