@@ -123,7 +123,6 @@ private:
         return Build{.tree = std::move(*tree),
                      .mesh = report_,
                      .levels = std::move(figures),
-                     .hole_radius = hole_radius_,
                      .solid_volume = solid_.value,
                      .solid_volume_error = solid_.error,
                      .mass = mass_,
@@ -131,6 +130,7 @@ private:
                      .resolution = resolution_,
                      .surface_mode = !closed(),
                      .goal_reached = goal_reached,
+                     .hole_radius = hole_radius_,
                      .seconds = seconds_since(start_)};
     }
 

@@ -140,11 +140,11 @@ TEST(Fill, AShellBecomesABlockAndIsProved) {
     BuildOptions options = quick(0);
     options.ellipsoids = 16;
     const double hollow = must_build(mesh, options).levels.back().union_volume;
-    options.fill = 0.25f;
+    options.fill = 0.15f;
     const Build built = must_build(mesh, options);
     EXPECT_FALSE(built.surface_mode);
     EXPECT_NEAR(built.solid_volume, 1, 0.06);
-    EXPECT_EQ(built.tree.view().bake_info().fill, 0.25f);
+    EXPECT_EQ(built.tree.view().bake_info().fill, 0.15f);
     EXPECT_GT(built.levels.back().union_volume, hollow * 0.5);
     const auto proof = verify(built.tree.view(), mesh.view());
     ASSERT_TRUE(proof);

@@ -323,7 +323,7 @@ TEST_F(Cli, ALengthIsMetWithAsFewAsNeeded) {
 }
 
 TEST_F(Cli, AFilledTreeSaysSoAndIsVerified) {
-    // A cube without its upper side: a box that a ball of half its width does not get into.
+    // A cube, 2 m wide, without its upper side: a ball sits in the opening, and all below it is filled.
     Mesh open = box_mesh(4, [](double x, double y, double z) {
         return Vec3{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
     });
@@ -331,10 +331,10 @@ TEST_F(Cli, AFilledTreeSaysSoAndIsVerified) {
         return open.vertices[t[0]].z + open.vertices[t[1]].z + open.vertices[t[2]].z == 3;
     });
     const std::string mesh = file("open.obj", obj_text(open)), out = file("out.etree");
-    const Outcome baked = run({"bake", mesh, "-o", out, "--quality", "fast", "--levels", "1", "--fill", "100cm"});
+    const Outcome baked = run({"bake", mesh, "-o", out, "--quality", "fast", "--levels", "1", "--fill", "60cm"});
     ASSERT_EQ(baked.code, 0) << baked.err;
-    EXPECT_NE(run({"info", out}).out.find("filled    what a ball of radius 1 cannot reach"), std::string::npos);
-    EXPECT_EQ(Json::parse(run({"info", out, "--json"}).out)["fill"], 1);
+    EXPECT_NE(run({"info", out}).out.find("filled    what a ball of radius 0.6 cannot reach"), std::string::npos);
+    EXPECT_EQ(Json::parse(run({"info", out, "--json"}).out)["fill"], 0.6);
     const Outcome verified = run({"verify", out, mesh});
     EXPECT_EQ(verified.code, 0) << verified.out << verified.err;
     EXPECT_EQ(verified.out.find("surface mode"), std::string::npos);
