@@ -3,6 +3,10 @@ include(CMakePackageConfigHelpers)
 
 install(TARGETS prolate_core prolate_query EXPORT prolate-query-targets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+if(PROLATE_BUILD_C)
+  install(TARGETS prolate_c EXPORT prolate-query-targets
+    LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
 install(EXPORT prolate-query-targets NAMESPACE prolate::
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)
 
@@ -26,7 +30,7 @@ if(NOT PROLATE_BUILD_BUILDER)
   set(excluded_headers REGEX "/(build|mesh|verify)\\.hpp$" EXCLUDE)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/prolate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.hpp" ${excluded_headers})
+  FILES_MATCHING PATTERN "*.hpp" PATTERN "*.h" ${excluded_headers})
 
 configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/prolate-config.cmake.in
   ${PROJECT_BINARY_DIR}/prolate-config.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/prolate)

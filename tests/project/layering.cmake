@@ -10,7 +10,7 @@ cmake_minimum_required(VERSION 3.25)
 
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
-set(layers include/prolate src query builder viewer cli python)
+set(layers include/prolate src query builder capi viewer cli python)
 set(core_headers "types|error|mass|primitives|bake_info|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
@@ -43,6 +43,10 @@ set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
+set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|bounds|jobs|world")
+set(capi_folders "capi")
+set(capi_libraries "prolate/prolate\\.h")
+
 set(viewer_headers "${core_headers}|query|collide|distance")
 set(viewer_folders "viewer")
 set(viewer_libraries "none")
@@ -57,6 +61,7 @@ set(python_folders "python")
 set(python_libraries "nanobind/.*|oneapi/tbb/.*")
 
 # Single files that may have one library more: the gateways.
+set(extra_include/prolate/prolate.h "std[a-z]+\\.h")
 set(extra_include/prolate/eigen.hpp "Eigen/.*")
 set(extra_include/prolate/glm.hpp "glm/.*")
 set(extra_include/prolate/tbb.hpp "oneapi/tbb/.*")
@@ -72,7 +77,7 @@ function(allowed out file layer form target)
   elseif(target MATCHES "^prolate/(.*)\\.hpp$")
     set(pattern "${${layer}_headers}")
     set(subject "${CMAKE_MATCH_1}")
-  elseif(target MATCHES "^(src|query|builder|viewer|cli|python|tests|bench|examples)/")
+  elseif(target MATCHES "^(src|query|builder|capi|viewer|cli|python|tests|bench|examples)/")
     set(pattern "${${layer}_folders}")
     set(subject "${CMAKE_MATCH_1}")
   elseif(form STREQUAL "<" AND target MATCHES "^[a-z_0-9]+$")

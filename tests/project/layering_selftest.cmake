@@ -5,7 +5,7 @@
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")
-foreach(folder include src query builder viewer cli)
+foreach(folder include src query builder capi viewer cli python)
   file(COPY "${ROOT}/${folder}" DESTINATION "${WORK}")
 endforeach()
 
@@ -56,6 +56,8 @@ plant(bad query/planted.cpp "#include <tbb/parallel_for.h>")
 plant(bad query/planted.cpp "#include \"cli/common.hpp\"")
 plant(bad viewer/planted.cpp "#include \"query/node/lanes.hpp\"")
 plant(good viewer/planted.cpp "#include <prolate/distance.hpp>")
+plant(bad capi/planted.cpp "#include \"query/node/lanes.hpp\"")
+plant(good capi/planted.cpp "#include <prolate/prolate.h>")
 plant(bad query/planted.cpp "#include \"src/../builder/winding.hpp\"")
 plant(good query/planted.cpp "#include <glm/vec3.hpp>")
 plant(good query/planted.cpp "#include <prolate/query.hpp>")

@@ -1,0 +1,234 @@
+// Queries of the C interface: each checks what it is given, and calls the one of C++.
+#include "capi/handles.hpp"
+
+#include <prolate/bounds.hpp>
+#include <prolate/collide.hpp>
+#include <prolate/contacts.hpp>
+#include <prolate/distance.hpp>
+#include <prolate/half_space.hpp>
+#include <prolate/points.hpp>
+#include <prolate/prolate.h>
+#include <prolate/raycast.hpp>
+#include <prolate/sweep.hpp>
+
+using namespace prolate;
+using namespace prolate::capi;
+
+namespace {
+
+// What every query of one or two bodies takes, checked.
+class Call {
+public:
+    template <class Options, class Result>
+    Call(std::initializer_list<const prolate_tree*> trees, void* scratch, size_t scratch_size, const Options* given,
+         Options& options, const Result* result) {
+        context = context_of(scratch, scratch_size);
+        if (context == nullptr || result == nullptr) status = PROLATE_BAD_ARGUMENT;
+        for (const prolate_tree* tree : trees) {
+            views_[count_] = view_of(tree);
+            if (views_[count_++] == nullptr) status = PROLATE_BAD_ARGUMENT;
+        }
+        if (status == PROLATE_OK && (!read(given, options) || !is_sound(result))) status = PROLATE_BAD_STRUCT;
+    }
+    const TreeView& a() const { return *views_[0]; }
+    const TreeView& b() const { return *views_[1]; }
+
+    prolate_status status = PROLATE_OK;
+    QueryContext* context;
+
+private:
+    const TreeView* views_[2] = {};
+    size_t count_ = 0;
+};
+
+DistanceOptions options_of(const prolate_distance_options& o) {
+    DistanceOptions out;
+    out.tolerance_absolute = o.tolerance_absolute;
+    if (o.tolerance_relative != 0) out.tolerance_relative = o.tolerance_relative;
+    if (o.max_distance != 0) out.max_distance = o.max_distance;
+    out.max_pair_tests = tests_of(o.max_tests);
+    return out;
+}
+
+prolate_distance_result result_of(const DistanceResult& r) {
+    auto out = fresh<prolate_distance_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed, out.lower = r.lower, out.upper = r.upper;
+    out.point_a = same<prolate_vec3>(r.point_a), out.point_b = same<prolate_vec3>(r.point_b);
+    out.normal = same<prolate_vec3>(r.normal);
+    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
+    return out;
+}
+
+prolate_contact_result result_of(const ContactResult& r) {
+    auto out = fresh<prolate_contact_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed, out.found = r.found, out.stats = stats_of(r.stats);
+    return out;
+}
+
+// Manifolds are laid out alike, so they are worked on where they are.
+static_assert(sizeof(prolate_manifolds) == sizeof(ContactManifolds) &&
+              offsetof(prolate_manifold, points) == offsetof(Manifold, points) &&
+              offsetof(prolate_contact_point, id) == offsetof(ContactPoint, id) &&
+              offsetof(prolate_contact_point, impulse) == offsetof(ContactPoint, impulse));
+template <class Query> ContactResult with_manifolds(prolate_manifolds* manifolds, Query&& query) {
+    ContactManifolds own;
+    std::memcpy(static_cast<void*>(&own), manifolds, sizeof own);
+    const ContactResult out = query(own);
+    std::memcpy(static_cast<void*>(manifolds), &own, sizeof own);
+    return out;
+}
+
+bool sound_points(prolate_body body, const prolate_vec3* points, size_t count, const void* out) {
+    return view_of(body.tree) != nullptr && (count == 0 || (points != nullptr && out != nullptr));
+}
+
+} // namespace
+
+prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                               const prolate_query_options* options, prolate_pair_cache* cache,
+                               prolate_collide_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    static_assert(sizeof(PairCache) == sizeof cache->opaque);
+    PairCache own;
+    if (cache != nullptr && cache->used == 1) std::memcpy(static_cast<void*>(&own), cache->opaque, sizeof own);
+    const CollideResult r = collide(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), *call.context,
+                                    capi::options_of(given), cache != nullptr ? &own : nullptr);
+    if (cache != nullptr) std::memcpy(cache->opaque, &own, sizeof own), cache->used = 1;
+    auto out = fresh<prolate_collide_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed;
+    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_distance(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                const prolate_distance_options* options, prolate_distance_result* result) {
+    auto given = fresh<prolate_distance_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    write(result_of(
+              distance(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), *call.context, ::options_of(given))),
+          result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_contacts(prolate_body a, prolate_body b, prolate_manifolds* manifolds, void* scratch,
+                                size_t scratch_size, const prolate_query_options* options,
+                                prolate_contact_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (manifolds == nullptr) return PROLATE_BAD_ARGUMENT;
+    const ContactResult r = with_manifolds(manifolds, [&](ContactManifolds& own) {
+        return contacts(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), own, *call.context,
+                        capi::options_of(given));
+    });
+    write(result_of(r), result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_sweep(const prolate_tree* a, prolate_motion motion_a, const prolate_tree* b,
+                             prolate_motion motion_b, void* scratch, size_t scratch_size,
+                             const prolate_sweep_options* options, prolate_sweep_result* result) {
+    auto given = fresh<prolate_sweep_options>();
+    const Call call({a, b}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    SweepOptions limits;
+    limits.tolerance = given.tolerance, limits.max_pair_tests = tests_of(given.max_tests), limits.margin = given.margin;
+    const SweepResult r =
+        sweep(call.a(), same<Motion>(motion_a), call.b(), same<Motion>(motion_b), *call.context, limits);
+    auto out = fresh<prolate_sweep_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed;
+    out.time_lower = r.time_lower, out.time_upper = r.time_upper, out.distance = r.distance;
+    out.point_a = same<prolate_vec3>(r.point_a), out.point_b = same<prolate_vec3>(r.point_b);
+    out.normal = same<prolate_vec3>(r.normal);
+    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch, size_t scratch_size,
+                               const prolate_query_options* options, prolate_raycast_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    const RaycastResult r =
+        raycast(call.a(), same<Pose>(body.pose), same<Ray>(ray), *call.context, capi::options_of(given));
+    auto out = fresh<prolate_raycast_result>();
+    out.verdict = verdict_of(r.verdict), out.t = r.t, out.clear = r.clear;
+    out.point = same<prolate_vec3>(r.point), out.normal = same<prolate_vec3>(r.normal);
+    out.node = r.node, out.triangle = r.triangle, out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_half_space_distance(prolate_body body, prolate_half_space half_space, void* scratch,
+                                           size_t scratch_size, const prolate_distance_options* options,
+                                           prolate_distance_result* result) {
+    auto given = fresh<prolate_distance_options>();
+    const Call call({body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    write(result_of(distance(call.a(), same<Pose>(body.pose), same<HalfSpace>(half_space), *call.context,
+                             ::options_of(given))),
+          result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_half_space_contacts(prolate_body body, prolate_half_space half_space,
+                                           prolate_manifolds* manifolds, void* scratch, size_t scratch_size,
+                                           const prolate_query_options* options, prolate_contact_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (manifolds == nullptr) return PROLATE_BAD_ARGUMENT;
+    const ContactResult r = with_manifolds(manifolds, [&](ContactManifolds& own) {
+        return contacts(call.a(), same<Pose>(body.pose), same<HalfSpace>(half_space), own, *call.context,
+                        capi::options_of(given));
+    });
+    write(result_of(r), result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_signed_distances(prolate_body body, const prolate_vec3* points, size_t count,
+                                        double max_distance, void* scratch, size_t scratch_size,
+                                        prolate_signed_distance* results) {
+    QueryContext* const context = context_of(scratch, scratch_size);
+    if (context == nullptr || !sound_points(body, points, count, results)) return PROLATE_BAD_ARGUMENT;
+    PointOptions options;
+    if (max_distance != 0) options.max_distance = max_distance;
+    constexpr size_t kAtOnce = 32; // points of one batch follow each other closely
+    SignedDistance some[kAtOnce];
+    for (size_t i = 0; i < count; i += kAtOnce) {
+        const size_t now = std::min(kAtOnce, count - i);
+        signed_distance(*view_of(body.tree), same<Pose>(body.pose), {reinterpret_cast<const Vec3*>(points) + i, now},
+                        {some, now}, *context, options);
+        for (size_t k = 0; k < now; ++k)
+            results[i + k] = {some[k].lower,
+                              some[k].upper,
+                              same<prolate_vec3>(some[k].point),
+                              same<prolate_vec3>(some[k].gradient),
+                              some[k].node,
+                              some[k].triangle,
+                              verdict_of(some[k].verdict)};
+    }
+    return PROLATE_OK;
+}
+
+prolate_status prolate_contains(prolate_body body, const prolate_vec3* points, size_t count, void* scratch,
+                                size_t scratch_size, prolate_verdict* sides) {
+    QueryContext* const context = context_of(scratch, scratch_size);
+    if (context == nullptr || !sound_points(body, points, count, sides)) return PROLATE_BAD_ARGUMENT;
+    static_assert(sizeof(Verdict) == sizeof *sides);
+    contains(*view_of(body.tree), same<Pose>(body.pose), {reinterpret_cast<const Vec3*>(points), count},
+             {reinterpret_cast<Verdict*>(sides), count}, *context);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_bounds(prolate_body body, float margin, prolate_box3* box) {
+    const TreeView* const view = view_of(body.tree);
+    if (view == nullptr || box == nullptr) return PROLATE_BAD_ARGUMENT;
+    *box = same<prolate_box3>(bounds(*view, same<Pose>(body.pose), margin));
+    return PROLATE_OK;
+}

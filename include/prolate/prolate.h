@@ -1,0 +1,367 @@
+/* The runtime for C (C11), and for every language that calls C: libprolate.so. The C++ headers beside this one are the
+ * reference of what is asked and certified; each function below names its own.
+ *
+ * Conventions
+ *  - Functions return a prolate_status, and PROLATE_OK is 0. A failed call writes nothing but *error.
+ *  - Structs that may grow begin with their size and a version. Make them with PROLATE_INIT(type), or set `size` to
+ *    sizeof and `version` to PROLATE_API_VERSION. A library reads and writes no more than the size that it is told, so
+ * a program runs with later libraries of the same version. Anything else is PROLATE_BAD_STRUCT.
+ *  - Options may be NULL for the defaults, and so may caches and errors. All other pointers must not be NULL:
+ *    PROLATE_BAD_ARGUMENT.
+ *  - Queries allocate nothing: they work in `scratch`, memory of the caller's, at least prolate_scratch_size() bytes,
+ *    aligned to 64, for one query at a time. It needs no initialisation. Only the functions that make primitives and
+ *    worlds allocate, the latter by the caller's functions.
+ *  - Trees may be shared between threads. Nothing has hidden state.
+ *  - Lengths in metres or any unit used consistently; a pose rotates first, then translates; quaternions are x, y, z,
+ * w.
+ *  - What is not finite is no error of a query, but never *separated* (query.hpp).
+ */
+#ifndef PROLATE_PROLATE_H
+#define PROLATE_PROLATE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(__GNUC__)
+#define PROLATE_API __attribute__((visibility("default")))
+#else
+#define PROLATE_API
+#endif
+
+/** Of this header. Raised when a struct or function changes so that older programs would not run. */
+#define PROLATE_API_VERSION 1u
+
+/** A struct of this type with its size and version set, and all else 0. C only: C++ has headers of its own. */
+#define PROLATE_INIT(type) ((type){.size = sizeof(type), .version = PROLATE_API_VERSION})
+
+/** What went wrong. Values are stable; 1 to 10 are those of prolate::ErrorCode. */
+typedef int32_t prolate_status;
+enum {
+    PROLATE_OK = 0,
+    PROLATE_BAD_OPTIONS = 1,
+    PROLATE_BAD_MESH = 2,
+    PROLATE_BAD_FILE = 3,
+    PROLATE_NEWER_VERSION = 4,
+    PROLATE_IO = 5,
+    PROLATE_CANCELLED = 6,
+    PROLATE_UNSUPPORTED = 7,
+    PROLATE_INTERNAL = 8,
+    PROLATE_OUT_OF_MEMORY = 9,
+    PROLATE_BAD_ID = 10,
+    PROLATE_BAD_ARGUMENT = 11, /**< a pointer is NULL, or scratch too small or not aligned */
+    PROLATE_BAD_STRUCT = 12,   /**< the size or version of a struct */
+    PROLATE_NO_ROOM = 13       /**< a buffer is too small; *needed says how large it must be */
+};
+
+/** One line of English, static; of any number. */
+PROLATE_API const char* prolate_status_text(prolate_status status);
+
+/** More about a failure: static text, and the byte offset, index or errno that it is about. */
+typedef struct prolate_error {
+    const char* what;
+    uint64_t where;
+} prolate_error;
+
+/** PROLATE_API_VERSION of the library. */
+PROLATE_API uint32_t prolate_api_version(void);
+/** Bytes of scratch that every query suffices with. */
+PROLATE_API size_t prolate_scratch_size(void);
+
+/* ---- values ---- */
+
+typedef struct prolate_vec3 {
+    float x, y, z;
+} prolate_vec3;
+typedef struct prolate_quat {
+    float x, y, z, w;
+} prolate_quat;
+typedef struct prolate_pose {
+    prolate_vec3 translation;
+    prolate_quat rotation;
+} prolate_pose;
+typedef struct prolate_box3 {
+    prolate_vec3 lower, upper;
+} prolate_box3;
+
+/** query.hpp: Verdict. Only PROLATE_SEPARATED is a promise that nothing touches. */
+typedef uint8_t prolate_verdict;
+enum { PROLATE_SEPARATED = 0, PROLATE_OVERLAPPING = 1, PROLATE_UNDECIDED = 2 };
+
+/** collide.hpp: MeetingPair. Triangles are UINT32_MAX where there are none. */
+typedef struct prolate_meeting_pair {
+    uint32_t node_a, node_b, triangle_a, triangle_b;
+} prolate_meeting_pair;
+
+/* ---- trees ---- */
+
+/** An opened tree: it holds no memory, and points into the bytes that it was opened in, which must outlive it. May be
+ * copied. */
+typedef struct prolate_tree {
+    uint64_t opaque[48];
+} prolate_tree;
+
+/** tree.hpp: TreeView::open(). Checks `bytes`, so that no file whatsoever makes a later query fail. */
+PROLATE_API prolate_status prolate_tree_open(const void* bytes, size_t count, prolate_tree* tree, prolate_error* error);
+/** Reads a file into `buffer`, of `capacity` bytes, and opens it there. `needed`, if not NULL, gets the file's size,
+ * also with PROLATE_NO_ROOM. */
+PROLATE_API prolate_status prolate_tree_load(const char* path, void* buffer, size_t capacity, size_t* needed,
+                                             prolate_tree* tree, prolate_error* error);
+
+typedef struct prolate_tree_info {
+    uint32_t size, version;
+    uint32_t nodes, levels, triangles, vertices;
+    bool exact, surface_mode, proved, prefix;
+    double volume, center[3], inertia[6]; /**< mass.hpp, at density 1: xx, yy, zz, xy, xz, yz */
+    double volume_error, center_error, inertia_error;
+} prolate_tree_info;
+PROLATE_API prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info* info);
+
+/** primitives.hpp. Their bytes go into `buffer` as with prolate_tree_load(); prolate_primitive_size() is enough but for
+ * large polyhedra. `triangles`: three indices each. */
+PROLATE_API size_t prolate_primitive_size(void);
+PROLATE_API prolate_status prolate_make_box(prolate_vec3 half, void* buffer, size_t capacity, size_t* needed,
+                                            prolate_tree* tree, prolate_error* error);
+PROLATE_API prolate_status prolate_make_sphere(float radius, void* buffer, size_t capacity, size_t* needed,
+                                               prolate_tree* tree, prolate_error* error);
+PROLATE_API prolate_status prolate_make_cylinder(float radius, float half_height, void* buffer, size_t capacity,
+                                                 size_t* needed, prolate_tree* tree, prolate_error* error);
+PROLATE_API prolate_status prolate_make_convex(const prolate_vec3* points, size_t point_count,
+                                               const uint32_t* triangles, size_t triangle_count, void* buffer,
+                                               size_t capacity, size_t* needed, prolate_tree* tree,
+                                               prolate_error* error);
+
+/* ---- queries ---- */
+
+/** A tree at a pose. */
+typedef struct prolate_body {
+    const prolate_tree* tree;
+    prolate_pose pose;
+} prolate_body;
+
+/** query.hpp: QueryOptions. 0 of max_tests and max_level means no limit. */
+typedef struct prolate_query_options {
+    uint32_t size, version;
+    uint64_t max_tests;
+    uint32_t max_level; /**< 0: all; else 1 more than QueryOptions::max_level */
+    float margin;
+} prolate_query_options;
+
+/** query.hpp: QueryStats. */
+typedef struct prolate_stats {
+    uint64_t pair_tests, block_tests, triangle_tests;
+    uint32_t deepest_level;
+} prolate_stats;
+
+/** collide.hpp: PairCache. Set it to 0 before its first use, and when a tree changes. */
+typedef struct prolate_pair_cache {
+    uint64_t opaque[10];
+    uint32_t used;
+} prolate_pair_cache;
+
+typedef struct prolate_collide_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    bool enclosed;
+    prolate_meeting_pair pair;
+    prolate_stats stats;
+} prolate_collide_result;
+/** collide.hpp: collide(). */
+PROLATE_API prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                           const prolate_query_options* options, prolate_pair_cache* cache,
+                                           prolate_collide_result* result);
+
+/** distance.hpp: DistanceOptions. 0 of max_distance and max_tests means no limit, of tolerances the default. */
+typedef struct prolate_distance_options {
+    uint32_t size, version;
+    double tolerance_absolute, tolerance_relative, max_distance;
+    uint64_t max_tests;
+} prolate_distance_options;
+typedef struct prolate_distance_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    bool enclosed;
+    double lower, upper; /**< certified: lower <= distance <= upper */
+    prolate_vec3 point_a, point_b, normal;
+    prolate_meeting_pair pair;
+    prolate_stats stats;
+} prolate_distance_result;
+/** distance.hpp: distance(). */
+PROLATE_API prolate_status prolate_distance(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                            const prolate_distance_options* options, prolate_distance_result* result);
+
+/** contacts.hpp: ContactPoint, Manifold, ContactManifolds. Set the last to 0 before its first use; keep it from one
+ * query to the next. */
+typedef struct prolate_contact_point {
+    prolate_vec3 point_a, point_b;
+    float depth;
+    uint32_t age;
+    uint64_t id;
+    float impulse[3];
+} prolate_contact_point;
+typedef struct prolate_manifold {
+    prolate_vec3 normal;
+    uint32_t count;
+    prolate_contact_point points[4];
+} prolate_manifold;
+typedef struct prolate_manifolds {
+    uint32_t count;
+    prolate_manifold manifolds[4];
+} prolate_manifolds;
+typedef struct prolate_contact_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    bool enclosed;
+    uint64_t found;
+    prolate_stats stats;
+} prolate_contact_result;
+/** contacts.hpp: contacts(). */
+PROLATE_API prolate_status prolate_contacts(prolate_body a, prolate_body b, prolate_manifolds* manifolds, void* scratch,
+                                            size_t scratch_size, const prolate_query_options* options,
+                                            prolate_contact_result* result);
+
+/** sweep.hpp: Motion. */
+typedef struct prolate_motion {
+    prolate_pose start;
+    prolate_vec3 linear, angular, center;
+} prolate_motion;
+typedef struct prolate_sweep_options {
+    uint32_t size, version;
+    double tolerance;
+    uint64_t max_tests; /**< 0: no limit */
+    float margin;
+} prolate_sweep_options;
+typedef struct prolate_sweep_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    bool enclosed;
+    double time_lower, time_upper, distance;
+    prolate_vec3 point_a, point_b, normal;
+    prolate_meeting_pair pair;
+    prolate_stats stats;
+} prolate_sweep_result;
+/** sweep.hpp: sweep(). */
+PROLATE_API prolate_status prolate_sweep(const prolate_tree* a, prolate_motion motion_a, const prolate_tree* b,
+                                         prolate_motion motion_b, void* scratch, size_t scratch_size,
+                                         const prolate_sweep_options* options, prolate_sweep_result* result);
+
+/** raycast.hpp: Ray, RaycastResult. */
+typedef struct prolate_ray {
+    prolate_vec3 origin, direction;
+    float max_t;
+} prolate_ray;
+typedef struct prolate_raycast_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    double t, clear;
+    prolate_vec3 point, normal;
+    uint32_t node, triangle;
+    prolate_stats stats;
+} prolate_raycast_result;
+/** raycast.hpp: raycast(). */
+PROLATE_API prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch, size_t scratch_size,
+                                           const prolate_query_options* options, prolate_raycast_result* result);
+
+/** shapes.hpp: HalfSpace. */
+typedef struct prolate_half_space {
+    prolate_vec3 normal;
+    float offset;
+} prolate_half_space;
+/** half_space.hpp: distance() and contacts(). */
+PROLATE_API prolate_status prolate_half_space_distance(prolate_body body, prolate_half_space half_space, void* scratch,
+                                                       size_t scratch_size, const prolate_distance_options* options,
+                                                       prolate_distance_result* result);
+PROLATE_API prolate_status prolate_half_space_contacts(prolate_body body, prolate_half_space half_space,
+                                                       prolate_manifolds* manifolds, void* scratch, size_t scratch_size,
+                                                       const prolate_query_options* options,
+                                                       prolate_contact_result* result);
+
+/** points.hpp: SignedDistance, of many points. */
+typedef struct prolate_signed_distance {
+    double lower, upper; /**< certified; below 0 inside */
+    prolate_vec3 point, gradient;
+    uint32_t node, triangle;
+    prolate_verdict verdict;
+} prolate_signed_distance;
+/** points.hpp: signed_distance() and contains(). `results` and `sides` have room for `count`; points may be NULL if
+ * that is 0. max_distance: 0 means no limit. */
+PROLATE_API prolate_status prolate_signed_distances(prolate_body body, const prolate_vec3* points, size_t count,
+                                                    double max_distance, void* scratch, size_t scratch_size,
+                                                    prolate_signed_distance* results);
+PROLATE_API prolate_status prolate_contains(prolate_body body, const prolate_vec3* points, size_t count, void* scratch,
+                                            size_t scratch_size, prolate_verdict* sides);
+
+/** bounds.hpp: bounds(). */
+PROLATE_API prolate_status prolate_bounds(prolate_body body, float margin, prolate_box3* box);
+
+/* ---- worlds ---- */
+
+/** world.hpp: World. */
+typedef struct prolate_world prolate_world;
+
+/** Where a world's memory comes from: `allocate` returns `size` bytes aligned to `alignment`, or NULL. */
+typedef struct prolate_allocator {
+    void* (*allocate)(void* user, size_t size, size_t alignment);
+    void (*release)(void* user, void* memory, size_t size, size_t alignment);
+    void* user;
+} prolate_allocator;
+
+/** jobs.hpp: Jobs. */
+typedef struct prolate_jobs {
+    void (*run)(void* user, uint32_t count, uint32_t grain,
+                void (*body)(void* job, uint32_t begin, uint32_t end, uint32_t worker), void* job);
+    void* user;
+    uint32_t workers;
+} prolate_jobs;
+
+typedef struct prolate_body_id {
+    uint32_t index, generation;
+} prolate_body_id;
+typedef struct prolate_body_pair {
+    prolate_body_id a, b;
+    uint32_t slot;
+    bool begins, moved;
+} prolate_body_pair;
+
+/** All but slack is 0 for the defaults of world.hpp; a slack of 0 stands for 0.1. */
+typedef struct prolate_world_options {
+    uint32_t size, version;
+    float slack;
+} prolate_world_options;
+/** A body of a world: world.hpp, Body. */
+typedef struct prolate_world_body {
+    uint32_t size, version;
+    const prolate_tree* tree; /**< its bytes must outlive the body */
+    prolate_pose pose;
+    uint64_t user;
+    uint32_t layers, mask; /**< if both are 0: in layer 1, and meets all */
+    float margin;
+} prolate_world_body;
+
+/** `allocator`: NULL for malloc(). Destroy the world with prolate_world_destroy(), which takes NULL, too. */
+PROLATE_API prolate_status prolate_world_create(const prolate_world_options* options,
+                                                const prolate_allocator* allocator, prolate_world** world);
+PROLATE_API void prolate_world_destroy(prolate_world* world);
+PROLATE_API prolate_status prolate_world_reserve(prolate_world* world, uint32_t bodies, uint32_t pairs);
+PROLATE_API prolate_status prolate_world_insert(prolate_world* world, const prolate_world_body* body,
+                                                prolate_body_id* id);
+PROLATE_API prolate_status prolate_world_remove(prolate_world* world, prolate_body_id id);
+PROLATE_API prolate_status prolate_world_move(prolate_world* world, prolate_body_id id, prolate_pose pose);
+/** World::update_pairs(): *pairs are `count` pairs, which are valid until the next call. `jobs` may be NULL: serial. */
+PROLATE_API prolate_status prolate_world_update_pairs(prolate_world* world, const prolate_jobs* jobs,
+                                                      const prolate_body_pair** pairs, size_t* count);
+/** World::collide(): verdicts[i] of pairs[i]. `scratch` holds workers * prolate_scratch_size() bytes. */
+PROLATE_API prolate_status prolate_world_collide(const prolate_world* world, const prolate_body_pair* pairs,
+                                                 size_t count, const prolate_jobs* jobs, void* scratch,
+                                                 size_t scratch_size, const prolate_query_options* options,
+                                                 prolate_verdict* verdicts);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

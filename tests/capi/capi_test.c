@@ -1,0 +1,290 @@
+/* The whole C interface, called by a program in C11: right answers, and a status for everything that is wrong. */
+#include <prolate/prolate.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int failures = 0;
+
+static void check(bool good, const char* what, int line) {
+    if (good) return;
+    fprintf(stderr, "capi_test.c:%d: %s\n", line, what);
+    ++failures;
+}
+#define CHECK(what) check(what, #what, __LINE__)
+#define CHECK_STATUS(call, expected) check((call) == (expected), #call, __LINE__)
+#define CHECK_OK(call) CHECK_STATUS(call, PROLATE_OK)
+
+static void* scratch;
+static size_t scratch_size;
+static unsigned char box_bytes[16384], ball_bytes[16384], other_bytes[16384];
+static prolate_tree box, ball;
+
+static const prolate_quat upright = {0, 0, 0, 1};
+static prolate_body at(const prolate_tree* tree, float x, float y, float z) {
+    const prolate_body out = {tree, {{x, y, z}, upright}};
+    return out;
+}
+
+static void test_trees(void) {
+    prolate_error error = {NULL, 0};
+    size_t needed = 0;
+    CHECK(prolate_api_version() == PROLATE_API_VERSION);
+    CHECK_OK(prolate_make_box((prolate_vec3){0.5f, 0.5f, 0.5f}, box_bytes, sizeof box_bytes, &needed, &box, &error));
+    CHECK(needed > 0 && needed <= prolate_primitive_size());
+    CHECK_OK(prolate_make_sphere(1, ball_bytes, sizeof ball_bytes, NULL, &ball, NULL));
+    prolate_tree other;
+    CHECK_OK(prolate_make_cylinder(1, 2, other_bytes, sizeof other_bytes, &needed, &other, NULL));
+    CHECK(needed <= prolate_primitive_size());
+
+    prolate_tree_info info = PROLATE_INIT(prolate_tree_info);
+    CHECK_OK(prolate_tree_describe(&box, &info));
+    CHECK(info.triangles == 12 && info.vertices == 8 && info.exact && !info.surface_mode && !info.prefix);
+
+    const prolate_vec3 points[] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const uint32_t triangles[] = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    CHECK_OK(prolate_make_convex(points, 4, triangles, 4, other_bytes, sizeof other_bytes, &needed, &other, &error));
+    CHECK_STATUS(prolate_make_convex(points, 4, triangles, 3, other_bytes, sizeof other_bytes, NULL, &other, &error),
+                 PROLATE_BAD_MESH);
+    CHECK(error.what != NULL && strlen(error.what) > 10 && error.where == 3);
+    CHECK_STATUS(prolate_make_convex(NULL, 4, triangles, 4, other_bytes, sizeof other_bytes, NULL, &other, NULL),
+                 PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_make_box((prolate_vec3){0.5f, -1, 0.5f}, other_bytes, sizeof other_bytes, NULL, &other, NULL),
+                 PROLATE_BAD_OPTIONS);
+    CHECK_STATUS(prolate_make_box((prolate_vec3){1, 1, 1}, other_bytes, 100, &needed, &other, NULL), PROLATE_NO_ROOM);
+    CHECK(needed > 100);
+    CHECK_STATUS(prolate_make_sphere(1, NULL, 100, NULL, &other, NULL), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_make_sphere(1, other_bytes, sizeof other_bytes, NULL, NULL, NULL), PROLATE_BAD_ARGUMENT);
+
+    /* The bytes of a tree are a file. */
+    CHECK_OK(prolate_make_box((prolate_vec3){1, 2, 3}, other_bytes, sizeof other_bytes, &needed, &other, NULL));
+    CHECK_OK(prolate_tree_open(other_bytes, needed, &other, &error));
+    CHECK_STATUS(prolate_tree_open(other_bytes, needed - 1, &other, &error), PROLATE_BAD_FILE);
+    CHECK_STATUS(prolate_tree_open(NULL, 5, &other, &error), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_tree_open(NULL, 0, &other, &error), PROLATE_BAD_FILE);
+    CHECK_STATUS(prolate_tree_open(other_bytes, needed, NULL, &error), PROLATE_BAD_ARGUMENT);
+    other_bytes[8] = 99;
+    CHECK_STATUS(prolate_tree_open(other_bytes, needed, &other, &error), PROLATE_NEWER_VERSION);
+    other_bytes[8] = 7;
+
+    const char* const path = "capi_test.etree";
+    FILE* const file = fopen(path, "wb");
+    CHECK(file != NULL && fwrite(other_bytes, 1, needed, file) == needed);
+    if (file != NULL) fclose(file);
+    size_t size = 0;
+    CHECK_STATUS(prolate_tree_load(path, NULL, 0, &size, &other, NULL), PROLATE_NO_ROOM);
+    CHECK(size == needed);
+    void* const bytes = malloc(size);
+    CHECK_OK(prolate_tree_load(path, bytes, size, NULL, &other, &error));
+    CHECK_OK(prolate_tree_describe(&other, &info));
+    free(bytes);
+    remove(path);
+    CHECK_STATUS(prolate_tree_load(path, other_bytes, sizeof other_bytes, NULL, &other, &error), PROLATE_IO);
+    CHECK(error.where != 0);
+}
+
+static void test_pairs(void) {
+    prolate_collide_result c = PROLATE_INIT(prolate_collide_result);
+    prolate_pair_cache cache;
+    memset(&cache, 0, sizeof cache);
+    for (int i = 0; i < 3; ++i) {
+        CHECK_OK(prolate_collide(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), scratch, scratch_size, NULL, &cache, &c));
+        CHECK(c.verdict == PROLATE_SEPARATED);
+    }
+    CHECK_OK(prolate_collide(at(&box, 0, 0, 0), at(&ball, 1.2f, 0, 0), scratch, scratch_size, NULL, NULL, &c));
+    CHECK(c.verdict == PROLATE_OVERLAPPING && c.pair.triangle_b == UINT32_MAX && c.stats.pair_tests > 0);
+    prolate_query_options options = PROLATE_INIT(prolate_query_options);
+    options.margin = 2;
+    CHECK_OK(prolate_collide(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), scratch, scratch_size, &options, NULL, &c));
+    CHECK(c.verdict == PROLATE_OVERLAPPING);
+
+    prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
+    CHECK_OK(prolate_distance(at(&box, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
+    CHECK(d.verdict == PROLATE_SEPARATED && d.lower <= 2 && d.upper >= 2 && d.upper - d.lower < 1e-5);
+    CHECK(fabsf(d.normal.x - 1) < 1e-6f && fabsf(d.point_a.x - 0.5f) < 1e-6f);
+    prolate_distance_options near = PROLATE_INIT(prolate_distance_options);
+    near.max_distance = 0.5;
+    CHECK_OK(prolate_distance(at(&box, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, &near, &d));
+    CHECK(d.verdict == PROLATE_SEPARATED && d.lower >= 0.5);
+
+    prolate_manifolds manifolds;
+    memset(&manifolds, 0, sizeof manifolds);
+    prolate_contact_result k = PROLATE_INIT(prolate_contact_result);
+    for (uint32_t step = 0; step < 3; ++step) {
+        CHECK_OK(prolate_contacts(at(&box, 0, 0, 0), at(&box, 0.1f, 0.1f, 0.999f), &manifolds, scratch, scratch_size,
+                                  NULL, &k));
+        CHECK(k.verdict == PROLATE_OVERLAPPING && manifolds.count == 1 && manifolds.manifolds[0].count == 4);
+        CHECK(fabsf(manifolds.manifolds[0].normal.z - 1) < 1e-5f);
+        CHECK(manifolds.manifolds[0].points[0].age == step);
+        CHECK(fabsf(manifolds.manifolds[0].points[0].depth - 0.001f) < 1e-5f);
+    }
+
+    prolate_sweep_result s = PROLATE_INIT(prolate_sweep_result);
+    const prolate_motion rest = {{{0, 0, 0}, upright}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}},
+                         flight = {{{5, 0, 0}, upright}, {-8, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+    CHECK_OK(prolate_sweep(&box, rest, &box, flight, scratch, scratch_size, NULL, &s));
+    CHECK(s.verdict == PROLATE_OVERLAPPING && fabs(s.time_upper - 0.5) < 1e-3);
+}
+
+static void test_one_body(void) {
+    prolate_raycast_result r = PROLATE_INIT(prolate_raycast_result);
+    const prolate_ray ray = {{-5, 0.1f, 0.1f}, {1, 0, 0}, INFINITY};
+    CHECK_OK(prolate_raycast(at(&box, 0, 0, 0), ray, scratch, scratch_size, NULL, &r));
+    CHECK(r.verdict == PROLATE_OVERLAPPING && fabs(r.t - 4.5) < 1e-5 && fabsf(r.normal.x + 1) < 1e-5f);
+
+    const prolate_half_space ground = {{0, 0, 1}, 0};
+    prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
+    CHECK_OK(prolate_half_space_distance(at(&box, 0, 0, 2), ground, scratch, scratch_size, NULL, &d));
+    CHECK(fabs(d.lower - 1.5) < 1e-6 && d.verdict == PROLATE_SEPARATED);
+    prolate_manifolds manifolds;
+    memset(&manifolds, 0, sizeof manifolds);
+    prolate_contact_result k = PROLATE_INIT(prolate_contact_result);
+    CHECK_OK(prolate_half_space_contacts(at(&box, 0, 0, 0.49f), ground, &manifolds, scratch, scratch_size, NULL, &k));
+    CHECK(manifolds.count == 1 && manifolds.manifolds[0].count == 4 && manifolds.manifolds[0].normal.z == -1);
+
+    prolate_vec3 points[100];
+    prolate_signed_distance distances[100];
+    prolate_verdict sides[100];
+    for (int i = 0; i < 100; ++i) points[i] = (prolate_vec3){0.02f * (float)i, 0, 0};
+    CHECK_OK(prolate_signed_distances(at(&box, 0, 0, 0), points, 100, 0, scratch, scratch_size, distances));
+    CHECK_OK(prolate_contains(at(&box, 0, 0, 0), points, 100, scratch, scratch_size, sides));
+    for (int i = 0; i < 100; ++i) {
+        const double truth = (double)points[i].x - 0.5;
+        CHECK(distances[i].lower <= truth + 1e-12 && distances[i].upper >= truth - 1e-12);
+        CHECK(distances[i].verdict == sides[i] && sides[i] == (truth > 0 ? PROLATE_SEPARATED : PROLATE_OVERLAPPING));
+    }
+    CHECK_OK(prolate_contains(at(&box, 0, 0, 0), NULL, 0, scratch, scratch_size, NULL));
+
+    prolate_box3 bounds;
+    CHECK_OK(prolate_bounds(at(&box, 10, 0, 0), 0, &bounds));
+    CHECK(bounds.lower.x <= 9.5f && bounds.lower.x > 9.4f && bounds.upper.x >= 10.5f && bounds.upper.x < 10.6f);
+}
+
+/* Serial jobs, in ranges of two. */
+static void run(void* user, uint32_t count, uint32_t grain, void (*body)(void*, uint32_t, uint32_t, uint32_t),
+                void* job) {
+    (void)grain;
+    ++*(int*)user;
+    for (uint32_t i = 0; i < count; i += 2) body(job, i, i + 2 < count ? i + 2 : count, 0);
+}
+
+static long allocated = 0;
+static void* take(void* user, size_t size, size_t alignment) {
+    (void)user;
+    allocated += (long)size;
+    return aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
+}
+static void* take_nothing(void* user, size_t size, size_t alignment) {
+    (void)user, (void)size, (void)alignment;
+    return NULL;
+}
+static void give(void* user, void* memory, size_t size, size_t alignment) {
+    (void)user, (void)alignment;
+    allocated -= (long)size;
+    free(memory);
+}
+
+static void test_worlds(void) {
+    prolate_world* world = NULL;
+    const prolate_allocator allocator = {take, give, NULL}, none = {take_nothing, give, NULL},
+                            half = {take, NULL, NULL};
+    CHECK_STATUS(prolate_world_create(NULL, &none, &world), PROLATE_OUT_OF_MEMORY);
+    CHECK_STATUS(prolate_world_create(NULL, &half, &world), PROLATE_BAD_ARGUMENT);
+    CHECK_OK(prolate_world_create(NULL, &allocator, &world));
+    CHECK(allocated > 0);
+    CHECK_OK(prolate_world_reserve(world, 16, 64));
+    prolate_body_id ids[5];
+    prolate_world_body body = PROLATE_INIT(prolate_world_body);
+    body.tree = &box;
+    body.pose.rotation = upright;
+    for (int i = 0; i < 5; ++i) {
+        body.pose.translation.x = 0.9f * (float)i;
+        CHECK_OK(prolate_world_insert(world, &body, &ids[i]));
+    }
+    int runs = 0;
+    const prolate_jobs jobs = {run, &runs, 1};
+    const prolate_body_pair* pairs = NULL;
+    size_t count = 0;
+    CHECK_OK(prolate_world_update_pairs(world, &jobs, &pairs, &count));
+    CHECK(count >= 4);
+    prolate_verdict* const verdicts = malloc(count + 1);
+    CHECK_OK(prolate_world_collide(world, pairs, count, &jobs, scratch, scratch_size, NULL, verdicts));
+    int meeting = 0;
+    for (size_t i = 0; i < count; ++i) meeting += verdicts[i] == PROLATE_OVERLAPPING;
+    CHECK(meeting == 4 && runs > 0);
+    CHECK_OK(prolate_world_collide(world, pairs, count, NULL, scratch, scratch_size, NULL, verdicts));
+    free(verdicts);
+    CHECK_OK(prolate_world_move(world, ids[0], (prolate_pose){{50, 0, 0}, upright}));
+    CHECK_OK(prolate_world_remove(world, ids[4]));
+    CHECK_STATUS(prolate_world_remove(world, ids[4]), PROLATE_BAD_ID);
+    CHECK_STATUS(prolate_world_move(world, ids[4], (prolate_pose){{50, 0, 0}, upright}), PROLATE_BAD_ID);
+    prolate_verdict unused[64];
+    CHECK_STATUS(prolate_world_collide(world, pairs, count, NULL, scratch, scratch_size, NULL, unused), PROLATE_BAD_ID);
+    CHECK_OK(prolate_world_update_pairs(world, NULL, &pairs, &count));
+    CHECK_STATUS(prolate_world_insert(world, NULL, &ids[0]), PROLATE_BAD_ARGUMENT);
+    body.version = 9;
+    CHECK_STATUS(prolate_world_insert(world, &body, &ids[0]), PROLATE_BAD_STRUCT);
+    prolate_world_destroy(world);
+    prolate_world_destroy(NULL);
+    CHECK(allocated == 0);
+}
+
+static void test_bad_input(void) {
+    prolate_collide_result c = PROLATE_INIT(prolate_collide_result);
+    prolate_tree never_opened;
+    memset(&never_opened, 0, sizeof never_opened);
+    const prolate_body good = at(&box, 0, 0, 0);
+    CHECK_STATUS(prolate_collide(at(NULL, 0, 0, 0), good, scratch, scratch_size, NULL, NULL, &c), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide(good, at(&never_opened, 0, 0, 0), scratch, scratch_size, NULL, NULL, &c),
+                 PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide(good, good, NULL, scratch_size, NULL, NULL, &c), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide(good, good, scratch, prolate_scratch_size() - 1, NULL, NULL, &c),
+                 PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide(good, good, (char*)scratch + 4, scratch_size, NULL, NULL, &c), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide(good, good, scratch, scratch_size, NULL, NULL, NULL), PROLATE_BAD_ARGUMENT);
+    c.version = 2;
+    CHECK_STATUS(prolate_collide(good, good, scratch, scratch_size, NULL, NULL, &c), PROLATE_BAD_STRUCT);
+    c = PROLATE_INIT(prolate_collide_result);
+    c.size = 3;
+    CHECK_STATUS(prolate_collide(good, good, scratch, scratch_size, NULL, NULL, &c), PROLATE_BAD_STRUCT);
+    prolate_query_options options = {0};
+    c = PROLATE_INIT(prolate_collide_result);
+    CHECK_STATUS(prolate_collide(good, good, scratch, scratch_size, &options, NULL, &c), PROLATE_BAD_STRUCT);
+
+    /* An older program's struct, which ends after the verdict: no byte behind it changes. */
+    c.size = 9;
+    c.pair.node_a = 12345;
+    CHECK_OK(prolate_collide(good, at(&box, 0.7f, 0, 0), scratch, scratch_size, NULL, NULL, &c));
+    CHECK(c.verdict == PROLATE_OVERLAPPING && c.pair.node_a == 12345);
+
+    /* What is not finite is never separated. */
+    c = PROLATE_INIT(prolate_collide_result);
+    prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
+    const float bad[] = {NAN, INFINITY, -INFINITY};
+    for (int i = 0; i < 3; ++i) {
+        CHECK_OK(prolate_collide(good, at(&box, bad[i], 9, 9), scratch, scratch_size, NULL, NULL, &c));
+        CHECK(c.verdict != PROLATE_SEPARATED);
+        CHECK_OK(prolate_distance(good, at(&box, bad[i], 9, 9), scratch, scratch_size, NULL, &d));
+        CHECK(d.verdict != PROLATE_SEPARATED && d.lower == 0);
+    }
+    const prolate_body no_rotation = {&box, {{9, 9, 9}, {0, 0, 0, 0}}};
+    CHECK_OK(prolate_collide(good, no_rotation, scratch, scratch_size, NULL, NULL, &c));
+    CHECK(c.verdict != PROLATE_SEPARATED);
+    CHECK_STATUS(prolate_bounds(good, 0, NULL), PROLATE_BAD_ARGUMENT);
+    for (prolate_status s = -2; s < 20; ++s) CHECK(strlen(prolate_status_text(s)) > 5);
+}
+
+int main(void) {
+    scratch_size = (prolate_scratch_size() + 63) / 64 * 64;
+    scratch = aligned_alloc(64, scratch_size);
+    test_trees();
+    test_pairs();
+    test_one_body();
+    test_worlds();
+    test_bad_input();
+    free(scratch);
+    if (failures == 0) puts("the C interface answers as it should");
+    return failures != 0;
+}

@@ -1,0 +1,22 @@
+# cmake -D NM=<nm> -D LIBRARY=<libprolate.so> -D HEADER=<prolate.h> -P exports.cmake
+#
+# The library exports every function of the header, and nothing else.
+execute_process(COMMAND ${NM} -D --defined-only ${LIBRARY} OUTPUT_VARIABLE output COMMAND_ERROR_IS_FATAL ANY)
+string(REGEX MATCHALL "[^ \n]+@@?[^\n]*|[^ \n]+\n" symbols "${output}")
+list(TRANSFORM symbols REPLACE "[@\n].*" "")
+list(REMOVE_ITEM symbols PROLATE_1)
+list(SORT symbols)
+file(READ ${HEADER} header)
+string(REGEX MATCHALL "PROLATE_API [a-z_0-9]+[ *]+(const )?(char\\* )?prolate_[a-z_0-9]+\\(" declared "${header}")
+string(REGEX MATCHALL "prolate_[a-z_0-9]+\\(" declared "${declared}")
+list(TRANSFORM declared REPLACE "\\(" "")
+string(REGEX MATCHALL "PROLATE_API const char\\* prolate_[a-z_]+" texts "${header}")
+list(TRANSFORM texts REPLACE ".* " "")
+list(APPEND declared ${texts})
+list(REMOVE_DUPLICATES declared)
+list(SORT declared)
+if(NOT symbols OR NOT symbols STREQUAL declared)
+  message(FATAL_ERROR "exported: ${symbols}\ndeclared: ${declared}")
+endif()
+list(LENGTH symbols count)
+message(STATUS "${count} functions, and nothing else")

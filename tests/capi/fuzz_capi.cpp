@@ -1,0 +1,135 @@
+// libFuzzer target: whatever numbers and bytes a program hands to the C interface, it answers with a status, and a
+// verdict that is not *separated* where something is not finite.
+//
+//   build-fuzz/tests/fuzz_capi -max_total_time=60 -max_len=4096 corpus tests/data
+//
+// The input: numbers for poses, shapes and options first, then the bytes of a tree; where these are no tree, a box.
+#include <prolate/prolate.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+namespace {
+
+void require(bool holds) {
+    if (!holds) std::abort();
+}
+
+// Takes values from the input's front; zeros when it has ended.
+class Input {
+public:
+    Input(const uint8_t* data, size_t size) : data_(data), size_(size) {}
+    template <class T> T take() {
+        T out{};
+        const size_t count = std::min(sizeof out, size_);
+        if (count > 0) std::memcpy(static_cast<void*>(&out), data_, count);
+        data_ += count, size_ -= count;
+        return out;
+    }
+    // Mostly numbers of a scene; the raw bits now and then.
+    float number() {
+        const auto kind = take<uint8_t>();
+        return kind % 4 == 0 ? take<float>() : static_cast<float>(take<int16_t>()) / 8192;
+    }
+    prolate_vec3 vector() {
+        const float x = number(), y = number(), z = number();
+        return {x, y, z};
+    }
+    prolate_pose pose() {
+        const prolate_vec3 t = vector(), axis = vector();
+        return {t, {axis.x, axis.y, axis.z, number()}};
+    }
+    const uint8_t* data() const { return data_; }
+    size_t size() const { return size_; }
+
+private:
+    const uint8_t* data_;
+    size_t size_;
+};
+
+template <class T> T fresh() {
+    T out{};
+    out.size = sizeof out, out.version = PROLATE_API_VERSION;
+    return out;
+}
+
+bool is_finite(const prolate_pose& p) {
+    const auto& [x, y, z, w] = p.rotation;
+    const float square = x * x + y * y + z * z + w * w;
+    return std::isfinite(p.translation.x + p.translation.y + p.translation.z) && std::isfinite(square) && square > 0;
+}
+
+struct Scratch {
+    alignas(64) unsigned char bytes[size_t{1} << 17];
+};
+
+void query(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scratch) {
+    void* const memory = scratch.bytes;
+    const size_t room = sizeof scratch.bytes;
+    auto options = fresh<prolate_query_options>();
+    options.max_tests = in.take<uint16_t>(), options.max_level = in.take<uint8_t>() % 4, options.margin = in.number();
+    const bool finite = is_finite(a.pose) && is_finite(b.pose);
+    auto c = fresh<prolate_collide_result>();
+    prolate_pair_cache cache = in.take<prolate_pair_cache>();
+    cache.used = 0;
+    require(prolate_collide(a, b, memory, room, &options, &cache, &c) == PROLATE_OK);
+    require(finite || c.verdict != PROLATE_SEPARATED);
+    auto again = fresh<prolate_collide_result>();
+    require(prolate_collide(a, b, memory, room, &options, &cache, &again) == PROLATE_OK);
+    auto limits = fresh<prolate_distance_options>();
+    limits.max_tests = options.max_tests, limits.max_distance = in.number(), limits.tolerance_relative = in.number();
+    auto d = fresh<prolate_distance_result>();
+    require(prolate_distance(a, b, memory, room, &limits, &d) == PROLATE_OK);
+    require(d.lower <= d.upper && (finite || d.verdict != PROLATE_SEPARATED));
+    auto manifolds = std::make_unique<prolate_manifolds>(in.take<prolate_manifolds>()); // as if of an earlier query
+    auto k = fresh<prolate_contact_result>();
+    require(prolate_contacts(a, b, manifolds.get(), memory, room, &options, &k) == PROLATE_OK);
+    require(manifolds->count <= 4);
+    const prolate_half_space ground{in.vector(), in.number()};
+    require(prolate_half_space_contacts(a, ground, manifolds.get(), memory, room, &options, &k) == PROLATE_OK);
+    require(manifolds->count <= 1);
+    require(prolate_half_space_distance(a, ground, memory, room, &limits, &d) == PROLATE_OK);
+    require(d.lower <= d.upper);
+    const prolate_ray ray{in.vector(), in.vector(), in.number()};
+    auto r = fresh<prolate_raycast_result>();
+    require(prolate_raycast(a, ray, memory, room, &options, &r) == PROLATE_OK);
+    const prolate_vec3 points[] = {in.vector(), in.vector(), in.vector()};
+    prolate_signed_distance signed_distances[3];
+    prolate_verdict sides[3];
+    require(prolate_signed_distances(a, points, 3, in.number(), memory, room, signed_distances) == PROLATE_OK);
+    require(prolate_contains(a, points, 3, memory, room, sides) == PROLATE_OK);
+    for (const auto& s : signed_distances) require(s.lower <= s.upper);
+    auto s = fresh<prolate_sweep_result>();
+    auto step = fresh<prolate_sweep_options>();
+    step.max_tests = 1 + in.take<uint8_t>(), step.tolerance = in.number(), step.margin = in.number();
+    const prolate_motion motion_a{a.pose, in.vector(), in.vector(), in.vector()}, motion_b{b.pose, {}, {}, {}};
+    require(prolate_sweep(a.tree, motion_a, b.tree, motion_b, memory, room, &step, &s) == PROLATE_OK);
+    require(s.time_lower <= s.time_upper || s.verdict == PROLATE_SEPARATED);
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    Input in(data, size);
+    const auto scratch = std::make_unique<Scratch>();
+    std::vector<unsigned char> box(prolate_primitive_size());
+    prolate_tree made, opened;
+    require(prolate_make_box({1, 0.5f, 0.25f}, box.data(), box.size(), nullptr, &made, nullptr) == PROLATE_OK);
+    const prolate_pose pose_a = in.pose(), pose_b = in.pose();
+    auto info = fresh<prolate_tree_info>();
+    Input rest = in;
+    for (int i = 0; i < 256; ++i) rest.take<uint8_t>(); // what follows the numbers
+    const bool sound = prolate_tree_open(rest.data(), rest.size(), &opened, nullptr) == PROLATE_OK;
+    if (sound) require(prolate_tree_describe(&opened, &info) == PROLATE_OK);
+    query(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
+    const prolate_vec3 half = in.vector();
+    prolate_tree other;
+    (void)prolate_make_box(half, box.data(), box.size(), nullptr, &other, nullptr);
+    (void)prolate_make_sphere(half.x, box.data(), box.size(), nullptr, &other, nullptr);
+    (void)prolate_make_cylinder(half.x, half.y, box.data(), box.size(), nullptr, &other, nullptr);
+    return 0;
+}
