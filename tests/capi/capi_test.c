@@ -65,9 +65,10 @@ static void test_trees(void) {
     CHECK_STATUS(prolate_tree_open(NULL, 5, &other, &error), PROLATE_BAD_ARGUMENT);
     CHECK_STATUS(prolate_tree_open(NULL, 0, &other, &error), PROLATE_BAD_FILE);
     CHECK_STATUS(prolate_tree_open(other_bytes, needed, NULL, &error), PROLATE_BAD_ARGUMENT);
+    const unsigned char version = other_bytes[8];
     other_bytes[8] = 99;
     CHECK_STATUS(prolate_tree_open(other_bytes, needed, &other, &error), PROLATE_NEWER_VERSION);
-    other_bytes[8] = 7;
+    other_bytes[8] = version;
 
     const char* const path = "capi_test.etree";
     FILE* const file = fopen(path, "wb");
