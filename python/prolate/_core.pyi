@@ -123,6 +123,26 @@ def overlap(
     out: object,
     wxyz: bool,
 ) -> int | _Bytes: ...
+def ground_distance(
+    a: object,
+    poses_a: object,
+    half_space: object,
+    tolerance: object,
+    max_distance: object,
+    budget: object,
+    threads: object,
+    wxyz: bool,
+) -> tuple[_PairArrays, bool]: ...
+def ground_contacts(
+    a: object,
+    poses_a: object,
+    half_space: object,
+    margin: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    wxyz: bool,
+) -> tuple[tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, NDArray[np.uint64]], _Bytes]: ...
 def bounds(tree: object, poses: object, margin: object, wxyz: bool) -> tuple[_Floats, _Floats, bool]: ...
 def contacts(
     a: object,

@@ -242,8 +242,8 @@ def collide(
 def distance(
     a: Tree,
     poses_a: ArrayLike,
-    b: Tree,
-    poses_b: ArrayLike,
+    b: Tree | HalfSpace,
+    poses_b: ArrayLike | None = None,
     *,
     tolerance: float = 1e-6,
     max_distance: float | None = None,
@@ -257,7 +257,9 @@ def distance(
     Parameters
     ----------
     a, poses_a, b, poses_b, budget, threads, order
-        As for :func:`collide`. Poses in float64 widen the bounds by what rounding moves.
+        As for :func:`collide`. Poses in float64 widen the bounds by what rounding moves. In the place of ``b`` may be a
+        :class:`HalfSpace`, which is in the world and has no pose; ``point_b`` is then the point of the plane below
+        ``point_a``.
     tolerance : float
         Stop as soon as ``upper - lower`` is at most this part of ``upper``.
     max_distance : float, optional
@@ -274,6 +276,12 @@ def distance(
     ValueError, TypeError
         As :func:`collide`.
     """
+    if isinstance(b, HalfSpace):
+        ground = _ground(b, poses_b)
+        arrays, single = _core.ground_distance(
+            a, poses_a, ground, tolerance, max_distance, budget, threads, _is_wxyz(order)
+        )
+        return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
     arrays, single = _core.distance(
         a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, _is_wxyz(order)
     )
@@ -283,8 +291,8 @@ def distance(
 def contacts(
     a: Tree,
     poses_a: ArrayLike,
-    b: Tree,
-    poses_b: ArrayLike,
+    b: Tree | HalfSpace,
+    poses_b: ArrayLike | None = None,
     *,
     margin: float = 0,
     max_level: int | None = None,
@@ -297,7 +305,8 @@ def contacts(
     Parameters
     ----------
     a, poses_a, b, poses_b, margin, max_level, budget, threads, order
-        As for :func:`collide`.
+        As for :func:`collide`. In the place of ``b`` may be a :class:`HalfSpace`, which is in the world and has no
+        pose.
 
     Returns
     -------
@@ -310,6 +319,10 @@ def contacts(
     ValueError, TypeError
         As :func:`collide`.
     """
+    if isinstance(b, HalfSpace):
+        ground = _ground(b, poses_b)
+        arrays, verdict = _core.ground_contacts(a, poses_a, ground, margin, max_level, budget, threads, _is_wxyz(order))
+        return Contacts(*arrays, verdict)
     arrays, verdict = _core.contacts(a, poses_a, b, poses_b, margin, max_level, budget, threads, _is_wxyz(order))
     return Contacts(*arrays, verdict)
 
@@ -480,6 +493,12 @@ def _numbers(shape: Shape) -> tuple[str, Floats]:
         offset = _row("shape.offset", [shape.offset], 1)
         return "half_space", np.concatenate([normal / length, offset])
     raise TypeError(f"shape: must be a Sphere, Capsule, Box or HalfSpace, not {type(shape).__name__}")
+
+
+def _ground(half_space: HalfSpace, pose: object) -> Floats:
+    if pose is not None:
+        raise TypeError("poses_b: a HalfSpace is in the world and has no pose")
+    return _numbers(half_space)[1]
 
 
 def overlap(

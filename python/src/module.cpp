@@ -64,5 +64,6 @@ NB_MODULE(_core, m) {
     python::bind_points(m);
     python::bind_primitives(m);
     python::bind_pairs(m);
+    python::bind_shapes(m);
     python::bind_world(m);
 }

@@ -1,13 +1,12 @@
-// Queries about trees at many poses: collide, distance, sweep, raycast, overlap.
+// Queries about trees at many poses: collide, distance, sweep, raycast.
+#include "python/src/answers.hpp"
 #include "python/src/batch.hpp"
 #include "python/src/poses.hpp"
 #include "python/src/tree.hpp"
 
-#include <prolate/bounds.hpp>
 #include <prolate/collide.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/raycast.hpp>
-#include <prolate/shapes.hpp>
 #include <prolate/sweep.hpp>
 
 #include <cmath>
@@ -15,24 +14,6 @@
 
 namespace prolate::python {
 namespace {
-
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
-
-// margin, max_level and budget of a call.
-struct Limits {
-    double margin;
-    uint32_t max_level;
-    uint64_t budget;
-
-    Limits(nb::handle margin_, nb::handle max_level_, nb::handle budget_)
-        : margin(number_from_0(margin_, "margin")),
-          max_level(static_cast<uint32_t>(whole_or(max_level_, "max_level", 0, UINT32_MAX, kMaxLevels))),
-          budget(whole_or(budget_, "budget", 0, UINT64_MAX, UINT64_MAX)) {}
-
-    QueryOptions options(double slack) const noexcept {
-        return {.max_level = max_level, .max_pair_tests = budget, .margin = rounded_up(margin + slack)};
-    }
-};
 
 // Two bodies at N poses.
 struct Bodies {
@@ -75,35 +56,6 @@ nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
     return results.array;
 }
 
-void store(double* at, const Point& p) noexcept {
-    std::copy(p.begin(), p.end(), at);
-}
-
-// Arrays of what is known of N pairs of points.
-struct PairArrays {
-    size_t count;
-    std::unique_ptr<double[]> lower, upper, point_a, point_b, normal;
-    std::unique_ptr<uint8_t[]> verdict;
-
-    explicit PairArrays(size_t n)
-        : count(n), lower(new_array<double>(n)), upper(new_array<double>(n)), point_a(new_array<double>(3 * n)),
-          point_b(new_array<double>(3 * n)), normal(new_array<double>(3 * n)), verdict(new_array<uint8_t>(n)) {}
-
-    template <class Result> void store_points(size_t i, const Result& r, bool known, const PlacedBodies& at) noexcept {
-        const double nan = std::numeric_limits<double>::quiet_NaN();
-        const Point unknown = {nan, nan, nan};
-        store(&point_a[3 * i], known ? at.to_world(r.point_a) : unknown);
-        store(&point_b[3 * i], known ? at.to_world(r.point_b) : unknown);
-        store(&normal[3 * i], known ? at.direction_to_world(r.normal) : unknown);
-    }
-    nb::tuple take() {
-        const size_t n = count;
-        return nb::make_tuple(to_numpy(std::move(lower), {n}), to_numpy(std::move(upper), {n}),
-                              to_numpy(std::move(point_a), {n, 3}), to_numpy(std::move(point_b), {n, 3}),
-                              to_numpy(std::move(normal), {n, 3}), to_numpy(std::move(verdict), {n}));
-    }
-};
-
 nb::tuple distance_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::handle poses_b, nb::handle tolerance,
                          nb::handle max_distance, nb::handle max_level, nb::handle budget, nb::handle threads,
                          bool wxyz) {
@@ -112,18 +64,15 @@ nb::tuple distance_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
     options.tolerance_relative = number_from_0(tolerance, "tolerance");
     options.max_level = static_cast<uint32_t>(whole_or(max_level, "max_level", 0, UINT32_MAX, kMaxLevels));
     options.max_pair_tests = whole_or(budget, "budget", 0, UINT64_MAX, UINT64_MAX);
-    const double most = max_distance.is_none() ? kInfinite : number_from_0(max_distance, "max_distance");
+    const double most =
+        max_distance.is_none() ? std::numeric_limits<double>::infinity() : number_from_0(max_distance, "max_distance");
     PairArrays out(bodies.count);
     for_all(bodies.count, thread_count(threads), [&](size_t i, QueryContext& context) {
         const PlacedBodies at = bodies.placed(i);
         DistanceOptions here = options;
         here.max_distance = most + at.slack;
         const DistanceResult r = distance(bodies.a.view, at.a, bodies.b.view, at.b, context, here);
-        out.lower[i] = std::max(0.0, r.lower - at.slack);
-        out.upper[i] = r.upper + at.slack;
-        const bool near = r.verdict == Verdict::separated && !(out.lower[i] > 0); // as collide() has it
-        out.verdict[i] = static_cast<uint8_t>(near ? Verdict::overlapping : r.verdict);
-        out.store_points(i, r, std::isfinite(r.upper) && !r.enclosed, at);
+        out.store(i, r, at);
     });
     return nb::make_tuple(out.take(), bodies.single());
 }
@@ -249,98 +198,6 @@ nb::tuple raycast_tree(nb::handle tree, nb::handle pose, nb::handle origins, nb:
                           single);
 }
 
-// ---- overlap ----
-
-Vec3 rounded(const Point& p, double& slack) noexcept {
-    const Vec3 out{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
-    slack += std::hypot(p[0] - out.x, p[1] - out.y, p[2] - out.z);
-    return out;
-}
-
-// The shapes of python/prolate/_queries.py, as their numbers in the world. Each is taken into the body's frame.
-class Shape {
-public:
-    Shape(char kind, std::span<const double> numbers) : kind_(kind), n_(numbers) {}
-
-    Verdict overlap_with(const HeldTree& held, const DoublePose& body, const Limits& limits,
-                         QueryContext& context) const noexcept {
-        double slack = 0;
-        const auto local = [&](size_t i) {
-            const Point d = {n_[i] - body.t[0], n_[i + 1] - body.t[1], n_[i + 2] - body.t[2]};
-            slack += 0x1p-46 * std::hypot(d[0], d[1], d[2]);
-            return rounded(rotated_back(body, d), slack);
-        };
-        const auto ask = [&](const auto& shape) {
-            return overlap(held.view, {}, shape, context, limits.options(slack)).verdict;
-        };
-        if (kind_ == 's') {
-            const Vec3 center = local(0);
-            return ask(Sphere{center, rounded_up(n_[3])});
-        }
-        if (kind_ == 'c') {
-            const Vec3 a = local(0), b = local(3);
-            return ask(Capsule{a, b, rounded_up(n_[6])});
-        }
-        if (kind_ == 'b') {
-            const RoundedPose box =
-                in_frame(body, {{n_[0], n_[1], n_[2]}, {n_[3], n_[4], n_[5], n_[6]}}, std::hypot(n_[7], n_[8], n_[9]));
-            slack = box.slack;
-            return ask(Box{box.pose, {rounded_up(n_[7]), rounded_up(n_[8]), rounded_up(n_[9])}});
-        }
-        const double length = std::hypot(n_[0], n_[1], n_[2]);
-        const Point normal = {n_[0] / length, n_[1] / length, n_[2] / length};
-        const double below = n_[3] / length - (normal[0] * body.t[0] + normal[1] * body.t[1] + normal[2] * body.t[2]);
-        double bent = 0;
-        const Vec3 local_normal = rounded(rotated_back(body, normal), bent);
-        // Near the body, the rounded plane deviates by what its normal is off, times the distance from the origin.
-        slack = 4 * (bent + 0x1p-46) * (held.reach + std::abs(below));
-        return ask(HalfSpace{local_normal, rounded_up(below)});
-    }
-
-private:
-    char kind_;
-    std::span<const double> n_;
-};
-
-nb::object overlap_shape(nb::handle tree, nb::handle poses_, const char* kind_, nb::handle numbers, nb::handle margin,
-                         nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out, bool wxyz) {
-    const HeldTree& held = tree_of(tree, "tree");
-    const Poses poses(poses_, "poses", wxyz);
-    const char kind = *kind_;
-    const size_t columns = kind == 's' || kind == 'h' ? 4 : kind == 'c' ? 7 : 10;
-    const Rows<double> row = rows_of_doubles(numbers, "shape", columns, true);
-    const Shape shape(kind, row.values);
-    const Limits limits(margin, max_level, budget);
-    const OutBytes results = out_bytes(out, poses.count());
-    for_all(poses.count(), thread_count(threads), [&](size_t i, QueryContext& context) {
-        results.data[i] = static_cast<uint8_t>(shape.overlap_with(held, poses.at(i), limits, context));
-    });
-    if (poses.single() && out.is_none()) return nb::int_(results.data[0]);
-    return results.array;
-}
-
-// (lower (N, 3), upper (N, 3))
-nb::tuple bounds_of(nb::handle tree, nb::handle poses_, nb::handle margin, bool wxyz) {
-    const HeldTree& held = tree_of(tree, "tree");
-    const Poses poses(poses_, "poses", wxyz);
-    const double wide = number_from_0(margin, "margin");
-    const size_t n = poses.count();
-    auto lower = new_array<double>(3 * n), upper = new_array<double>(3 * n);
-    for (size_t i = 0; i < n; ++i) {
-        // The body is only turned; the box is moved in double precision, outward.
-        const DoublePose pose = poses.at(i), turn{{0, 0, 0}, {pose.q[0], pose.q[1], pose.q[2], pose.q[3]}};
-        const RoundedPose at = in_frame({}, turn, held.reach);
-        const Bounds box = bounds(held.view, at.pose, rounded_up(wide + at.slack));
-        const double low[3] = {box.lower.x, box.lower.y, box.lower.z},
-                     high[3] = {box.upper.x, box.upper.y, box.upper.z};
-        for (size_t k = 0; k < 3; ++k) {
-            lower[3 * i + k] = std::nextafter(low[k] + pose.t[k], -kInfinite);
-            upper[3 * i + k] = std::nextafter(high[k] + pose.t[k], kInfinite);
-        }
-    }
-    return nb::make_tuple(to_numpy(std::move(lower), {n, 3}), to_numpy(std::move(upper), {n, 3}), poses.single());
-}
-
 } // namespace
 
 void bind_queries(nb::module_& m) {
@@ -357,11 +214,6 @@ void bind_queries(nb::module_& m) {
     m.def("raycast", &raycast_tree, nb::arg("tree").none(), nb::arg("pose").none(), nb::arg("origins").none(),
           nb::arg("directions").none(), nb::arg("radius").none(), nb::arg("max_t").none(), nb::arg("max_level").none(),
           nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("wxyz"));
-    m.def("overlap", &overlap_shape, nb::arg("tree").none(), nb::arg("poses").none(), nb::arg("kind"),
-          nb::arg("numbers").none(), nb::arg("margin").none(), nb::arg("max_level").none(), nb::arg("budget").none(),
-          nb::arg("threads").none(), nb::arg("out").none(), nb::arg("wxyz"));
-    m.def("bounds", &bounds_of, nb::arg("tree").none(), nb::arg("poses").none(), nb::arg("margin").none(),
-          nb::arg("wxyz"));
 }
 
 } // namespace prolate::python

@@ -199,6 +199,34 @@ def test_overlap_with_shapes(box_a):
     assert touching == Verdict.SEPARATED
 
 
+@pytest.mark.parametrize("far", [0.0, 1e7])
+def test_ground_under_boxes(box_a, far):
+    rng = np.random.default_rng(17)
+    at = poses(rng, 300, 0.8)
+    at[:, :3] += far
+    ground = prolate.HalfSpace([2.0, -1.0, 2.0], far - 0.2)
+    normal = np.array([2.0, -1.0, 2.0]) / 3
+    matrices = np.array([matrix(p) for p in at])
+    gap = at[:, :3] @ normal - ground.offset - np.abs(normal @ matrices[:, :3, :3]) @ HALF_A
+    found = prolate.distance(box_a, at, ground)
+    apart = gap > 1e-6
+    doubt = 1e-6 + 1e-15 * far
+    assert (found.lower[apart] <= gap[apart] + doubt).all() and (found.upper[apart] >= gap[apart] - doubt).all()
+    assert (found.upper[apart] - found.lower[apart] < 1e-5).all()
+    assert (found.verdict[apart] == Verdict.SEPARATED).all() and (found.verdict[gap < 0] == Verdict.OVERLAPPING).all()
+    assert np.allclose(found.normal[apart], -normal, atol=1e-5)
+    touch = prolate.contacts(box_a, at, ground)
+    for i in range(300):
+        rows = slice(touch.offsets[i], touch.offsets[i + 1])
+        assert (touch.verdict[i] == Verdict.OVERLAPPING) == (rows.stop > rows.start)
+        if gap[i] < -1e-6:
+            assert touch.depth[rows].max() == pytest.approx(-gap[i], abs=1e-5)
+            assert np.allclose(touch.normal[rows], -normal, atol=1e-5)
+    assert (prolate.overlap(box_a, at, ground) == found.verdict).all()
+    with pytest.raises(TypeError, match="poses_b"):
+        prolate.distance(box_a, at, ground, IDENTITY)
+
+
 def box_distance(half, local):
     """Signed distance from a box."""
     q = np.abs(local) - half
