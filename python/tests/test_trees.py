@@ -270,7 +270,9 @@ def test_progress_and_cancel():
         prolate.bake(*mesh, levels=4, quality="best", progress=fail)
 
 
-def test_ctrl_c_ends_a_bake():
+def test_ctrl_c_ends_a_bake(request):
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
