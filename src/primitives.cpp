@@ -307,7 +307,8 @@ Result<Tree> ellipsoid_tree(const Ellipsoid& e) {
         PackedLevel level;
         level.nodes.resize(1);
         double scale = 1;
-        for (int i = 0; i < 64; ++i) {
+        constexpr double kMostScale = 2; // beyond, no node of the format is small or large enough
+        while (scale < kMostScale) {
             double factor[6];
             std::transform(std::begin(entries), std::end(entries), factor, [&](double x) { return scale * x; });
             format::quantise(level.nodes[0], lattice, center.data(), factor);

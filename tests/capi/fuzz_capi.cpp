@@ -6,8 +6,10 @@
 // The input: numbers for poses, shapes and options first, then the bytes of a tree; where these are no tree, a box.
 #include <prolate/prolate.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -15,9 +17,12 @@
 
 namespace {
 
-void require(bool holds) {
-    if (!holds) std::abort();
+void require_at(bool holds, int line) {
+    if (holds) return;
+    std::fprintf(stderr, "fuzz_capi.cpp:%d\n", line);
+    std::abort();
 }
+#define require(...) require_at(__VA_ARGS__, __LINE__) // NOLINT(cppcoreguidelines-macro-usage): the line is what helps
 
 // Takes values from the input's front; zeros when it has ended.
 class Input {
@@ -58,9 +63,10 @@ template <class T> T fresh() {
 }
 
 bool is_finite(const prolate_pose& p) {
-    const auto& [x, y, z, w] = p.rotation;
-    const float square = x * x + y * y + z * z + w * w;
-    return std::isfinite(p.translation.x + p.translation.y + p.translation.z) && std::isfinite(square) && square > 0;
+    const double x = p.rotation.x, y = p.rotation.y, z = p.rotation.z, w = p.rotation.w;
+    const double square = x * x + y * y + z * z + w * w;
+    const double sum = double{p.translation.x} + double{p.translation.y} + double{p.translation.z};
+    return std::isfinite(sum) && std::isfinite(square) && square > 0;
 }
 
 struct Scratch {

@@ -217,6 +217,7 @@ TEST(Primitives, NumbersOutOfRangeAreRefused) {
         EXPECT_FALSE(sphere_tree(x)) << x;
         EXPECT_FALSE(cylinder_tree(x, x)) << x;
     }
+    EXPECT_FALSE(ellipsoid_tree({{0, 0, 0}, 1e-30f, 0, 1e-38f, 0, 0, 1e-30f}));
     EXPECT_FALSE(ellipsoid_tree({{nan, 0, 0}, 1, 0, 1, 0, 0, 1}));
     EXPECT_FALSE(ellipsoid_tree({{0, 0, 0}, 1, infinite, 1, 0, 0, 1}));
 }
