@@ -80,6 +80,7 @@ Outcome<> draw(const CompareArguments& a, const std::vector<Choice>& choices, co
     options.view = *view;
     options.threads = a.asset.options.threads;
     std::vector<CoverPanel> panels;
+    panels.reserve(choices.size());
     for (const Choice& c : choices)
         panels.push_back(
             {c.tree.view(), c.hull.view(),

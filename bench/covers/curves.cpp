@@ -188,7 +188,9 @@ int main(int argc, char** argv) {
     app.add_option("--kept", a.kept, "folder for baked trees, which later runs read")->capture_default_str();
     app.add_option("--out", a.out, "folder for the table and the plots")->capture_default_str();
     app.add_option("--peers", a.peers, "Python that has peers installed, as ./run peers makes it");
-    app.add_option("--peer", a.peer_names, "which of them: V-HACD, CoACD")->delimiter(',')->capture_default_str();
+    app.add_option("--peer", a.peer_names, "which of them: V-HACD, CoACD, Rapier")
+        ->delimiter(',')
+        ->capture_default_str();
     app.add_option("--peer-counts", a.peer_counts, "hulls asked for")->delimiter(',')->capture_default_str();
     app.add_option("--peer-seconds", a.peer_seconds, "wall time after which a peer is stopped")->capture_default_str();
     app.add_option("--columns", a.columns, "columns across, to judge hulls with")

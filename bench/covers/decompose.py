@@ -3,6 +3,8 @@
     decompose.py list                           names of those that are installed, a line each
     decompose.py NAME COUNT SECONDS IN OUT      at most COUNT hulls of the Wavefront mesh IN, into OUT
 
+Rapier's function takes no count: it makes as many as its defaults lead to.
+
 OUT has the hulls one after the other, each a closed surface oriented outwards. The last line of the standard output is
 the cost, as JSON. A run of more than SECONDS is killed by SIGALRM.
 """
@@ -14,7 +16,7 @@ import sys
 import time
 
 # by the name of the package that runs them
-PEERS = {"V-HACD": "vhacdx", "CoACD": "coacd"}
+PEERS = {"V-HACD": "vhacdx", "CoACD": "coacd", "Rapier": "rapier3d"}
 
 
 def installed(name):
@@ -43,6 +45,11 @@ def decompose(name, count, vertices, faces):
         import vhacdx
 
         return vhacdx.compute_vhacd(vertices, faces, maxConvexHulls=count, asyncACD=False)
+    if name == "Rapier":
+        import rapier3d
+
+        parts = rapier3d.SharedShape.convex_decomposition(vertices, faces).as_compound().shapes()
+        return [shape.as_convex_polyhedron().to_trimesh() for _, shape in parts]
     import coacd
 
     coacd.set_log_level("off")

@@ -22,7 +22,7 @@ public:
     /// `python` is the interpreter that ./run peers makes.
     explicit Decomposers(std::string python) : python_(std::move(python)) {}
 
-    /// Those that are installed: "V-HACD", "CoACD". If none is, `why` says why.
+    /// Those that are installed: "V-HACD", "CoACD", "Rapier". If none is, `why` says why.
     std::vector<std::string> names(std::string& why) const;
     /// At most `count` hulls of `mesh`, within `seconds` of wall time; nothing if that fails.
     std::optional<Decomposition> run(const std::string& name, MeshView mesh, uint32_t count, uint32_t seconds) const;

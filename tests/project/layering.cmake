@@ -68,6 +68,7 @@ set(extra_include/prolate/tbb.hpp "oneapi/tbb/.*")
 set(extra_builder/collada_document.hpp "pugixml\\.hpp")
 set(extra_builder/gltf_document.hpp "nlohmann/.*")
 set(extra_builder/import_3mf.cpp "Model/COM/.*")
+set(extra_cli/compare/hull.cpp "libqhull_r/.*")
 
 # allowed(OUT file layer form target): may `file` of `layer` include <target> (form "<") or "target" (form ")?
 function(allowed out file layer form target)
