@@ -40,8 +40,8 @@ function(expect_headers folder)
 endfunction()
 
 # README's table of headers: those that it names, in all columns.
-file(STRINGS ${ROOT}/README.md table REGEX "^\\| `[a-z]+\\.hpp` \\|")
-string(REGEX MATCHALL "[a-z]+\\.hpp" in_table "${table}")
+file(STRINGS ${ROOT}/README.md table REGEX "^\\| `[a-z_]+\\.hpp` \\|")
+string(REGEX MATCHALL "[a-z_]+\\.hpp" in_table "${table}")
 list(SORT in_table)
 
 # use_rows(TREE HEADERS...): the answers of all rows are right, and no header of the table is left out but those named.
