@@ -111,7 +111,7 @@ MassProperties mass_of(MeshView mesh, bool closed, const Columns& columns) {
     for (size_t i = 0; i < 3; ++i) {
         const size_t j = (i + 1) % 3, k = (i + 2) % 3;
         out.inertia[i] = moments[j] + moments[k];
-        out.inertia[3 + i] = -moments[3 + i];
+        out.inertia[3 + i] = 0 - moments[3 + i]; // not -0
         out.inertia_error = std::max({out.inertia_error, errors[j] + errors[k], errors[3 + i]});
     }
     return out;
