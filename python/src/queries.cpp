@@ -36,7 +36,13 @@ nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
                          nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out, bool wxyz) {
     const Bodies bodies(a, poses_a, b, poses_b, wxyz);
     const Limits limits(margin, max_level, budget);
+    const Pose *const floats_a = bodies.poses_a.floats(), *const floats_b = bodies.poses_b.floats();
+    const QueryOptions as_given = limits.options(0);
     const auto verdict_of = [&](size_t i, QueryContext& context) {
+        if (floats_a && floats_b)
+            return static_cast<uint8_t>(collide(bodies.a.view, floats_a[bodies.poses_a.index(i)], bodies.b.view,
+                                                floats_b[bodies.poses_b.index(i)], context, as_given)
+                                            .verdict);
         if (limits.budget > 0 && bodies.far_apart(i, limits.margin)) return static_cast<uint8_t>(Verdict::separated);
         const PlacedBodies at = bodies.placed(i);
         return static_cast<uint8_t>(
