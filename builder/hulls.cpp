@@ -4,6 +4,8 @@
 // from any convex combination of the points, and Gilbert's algorithm finds good ones (E. G. Gilbert 1966, "An iterative
 // procedure for computing the minimum of a quadratic form on a convex set").
 //
+// Where a node's triangles are coplanar, or a face ends it, the record also holds a slab (src/slab.hpp).
+//
 // Complexity: O(n) an inner node of n corners, with a large constant (some thousand products a corner).
 #include "builder/hulls.hpp"
 
@@ -11,6 +13,9 @@
 #include "builder/job.hpp"
 
 #include "src/bytes.hpp"
+#include "src/slab.hpp"
+
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -21,6 +26,12 @@ namespace prolate {
 namespace {
 
 constexpr int kMostSteps = 200;
+constexpr size_t kPlanes = 16; // that are tried for a slab
+// Of a node's size: a slab that is thicker tells no more than the hull, whose points are rounded, unless it ends with a
+// face. That is at least kFewest triangles, and that share of the node's area, which are as near to a plane as floats
+// tell.
+constexpr double kThinSlab = 0x1p-12, kTouching = 0x1p-20, kShareOfFace = 0.125;
+constexpr size_t kFewest = 16;
 // More than rounding costs anywhere below, in unit-ball coordinates: in double, some 2^-53 times the axis ratio, which
 // is at most 2^14.
 constexpr double kRounding = 1e-9;
@@ -70,28 +81,114 @@ std::vector<Vec> choose(const std::vector<Vec>& w) {
     return out;
 }
 
-// The corners below a node, each once.
-std::vector<Vec> corners_below(const TreeView& tree, uint32_t node) {
+// What lies below a node: triangles, and their corners, each once.
+struct Below {
+    std::vector<uint32_t> triangles;
+    std::vector<Vec> corners;
+};
+Below below(const TreeView& tree, uint32_t node) {
+    Below out;
     std::vector<uint32_t> vertices;
     const auto collect = [&](const auto& self, uint32_t at) -> void {
         const TriangleRange range = tree.triangles(at);
-        for (uint32_t t = range.first; t < range.first + range.count; ++t)
+        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+            out.triangles.push_back(t);
             for (const uint32_t v : tree.triangle(t)) vertices.push_back(v);
+        }
         const ChildRange children = tree.children(at);
         for (uint32_t i = 0; i < children.count; ++i) self(self, children.first + i);
     };
     collect(collect, node);
     std::sort(vertices.begin(), vertices.end());
     vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-    std::vector<Vec> out;
-    out.reserve(vertices.size());
-    for (const uint32_t v : vertices) out.push_back(to_vec(tree.vertex(v)));
+    out.corners.reserve(vertices.size());
+    for (const uint32_t v : vertices) out.corners.push_back(to_vec(tree.vertex(v)));
     return out;
+}
+
+// Twice the area of a triangle, squared.
+double area_squared(const TreeView& tree, uint32_t triangle) {
+    const Triangle t = tree.triangle(triangle);
+    const Vec p = to_vec(tree.vertex(t[0]));
+    return (to_vec(tree.vertex(t[1])) - p).cross(to_vec(tree.vertex(t[2])) - p).squaredNorm();
+}
+
+// Between which heights over a plane all corners lie, rounded outwards; wider than `enough`, perhaps too little, once
+// it is certain that the plane is neither on the one side of all of them nor on the other, but for `touching`.
+struct Heights {
+    double low = 0, high = 0;
+    double width() const { return high - low; }
+};
+Heights heights_over(const Slab& plane, std::span<const Vec> corners, double enough, double touching) {
+    Heights out;
+    const double of_origin = Vec(plane.origin).lpNorm<1>();
+    for (const Vec& x : corners) {
+        const double height = plane.height(x.data());
+        const double rounding = kSlabRounding * (x.lpNorm<1>() + of_origin);
+        out.low = std::min(out.low, height - rounding), out.high = std::max(out.high, height + rounding);
+        if (out.width() > enough && out.low < -touching && out.high > touching) break;
+    }
+    return out;
+}
+
+// The area of the triangles in a plane; 0 if they are fewer than kFewest.
+double area_in(const TreeView& tree, const Slab& plane, std::span<const uint32_t> triangles, double touching) {
+    double area = 0;
+    size_t count = 0;
+    for (const uint32_t t : triangles) {
+        const Triangle corners = tree.triangle(t);
+        const bool in_plane = std::all_of(corners.begin(), corners.end(), [&](uint32_t v) {
+            return std::abs(plane.height(to_vec(tree.vertex(v)).data())) <= touching;
+        });
+        if (in_plane) area += std::sqrt(area_squared(tree, t)), ++count;
+    }
+    return count < kFewest ? 0 : area;
+}
+
+void store_slab(std::byte* record, const Slab& plane, uint32_t triangle, const Heights& heights) {
+    for (size_t k = 0; k < 3; ++k)
+        store_le(record + kHullNormal + k, static_cast<int8_t>(std::round(plane.normal[k] * kHullUnit)));
+    store_le(record + kHullPlane, triangle);
+    store_le(record + kHullLow, std::nextafter(static_cast<float>(heights.low), -HUGE_VALF));
+    store_le(record + kHullHigh, std::nextafter(static_cast<float>(heights.high), HUGE_VALF));
+}
+
+// Of the planes of the largest triangles that with the thinnest slab, if that is thin for a node of this size; else the
+// plane of a face, with all of the node on one side of it, that has the most area.
+void describe_slab(const TreeView& tree, Below& below, double size, std::byte* record) {
+    std::vector<uint32_t>& triangles = below.triangles;
+    const size_t count = std::min(triangles.size(), kPlanes);
+    std::partial_sort(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(count), triangles.end(),
+                      [&](uint32_t s, uint32_t t) {
+                          const double of_s = area_squared(tree, s), of_t = area_squared(tree, t);
+                          return of_s > of_t || (of_s == of_t && s < t);
+                      });
+    double whole = 0;
+    for (const uint32_t t : triangles) whole += std::sqrt(area_squared(tree, t));
+    const double touching = kTouching * size;
+    double thinnest = kThinSlab * size, largest = kShareOfFace * whole;
+    bool thin = false;
+    for (const uint32_t t : std::span(triangles).first(count)) {
+        const Slab plane = plane_of(tree, t);
+        if (!Vec(plane.normal).allFinite()) continue;
+        const Heights heights = heights_over(plane, below.corners, thinnest, touching);
+        if (heights.width() <= thinnest) {
+            thin = true, thinnest = heights.width();
+            store_slab(record, plane, t, heights);
+        } else if (!thin && (heights.low >= -touching || heights.high <= touching)) {
+            const double area = area_in(tree, plane, triangles, touching);
+            if (!(area > largest)) continue;
+            largest = area;
+            store_slab(record, plane, t, heights);
+        }
+    }
 }
 
 void describe(const TreeView& tree, uint32_t node, std::byte* record) {
     const Fit fit(tree.ellipsoid(node));
-    std::vector<Vec> w = corners_below(tree, node);
+    Below at = below(tree, node);
+    describe_slab(tree, at, fit.factor.norm(), record);
+    std::vector<Vec> w = std::move(at.corners);
     for (Vec& x : w) x = fit.radial(x);
     const std::vector<Vec> chosen = choose(w);
     for (size_t i = 0; i < kHullPoints; ++i) // the last again where there are fewer

@@ -11,6 +11,8 @@
 #include "builder/hulls.hpp"
 #include "builder/job.hpp"
 
+#include "src/slab.hpp"
+
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -66,12 +68,19 @@ Doubt compare(const TreeView& tree, MeshView mesh) {
     return out;
 }
 
+// Both heights are rounded outwards.
+bool in_slab(const Slab& slab, const Vec& x) {
+    const double height = slab.height(x.data());
+    const double rounding = kSlabRounding * (x.lpNorm<1>() + Vec(slab.origin).lpNorm<1>());
+    return height - rounding >= slab.low && height + rounding <= slab.high;
+}
+
 bool in_hull(const Hull& hull, const Vec& w) {
     const double enough = hull.share - kHullRounding;
     return hull.distance(w, enough) <= enough;
 }
 
-// For each node, a corner beneath it that it, or its hull, does not hold.
+// For each node, a corner beneath it that it, its hull or its slab does not hold.
 std::vector<Doubt> find_doubts(const TreeView& tree) {
     const uint32_t slots = tree.slot_count();
     std::vector<uint32_t> parent(slots, 0);
@@ -80,6 +89,7 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
     std::vector<Fit> fits(slots);
     std::vector<Doubt> doubts(slots);
     std::vector<std::optional<Hull>> hulls(slots);
+    std::vector<std::optional<Slab>> slabs(slots);
     tree.for_each_node([&](uint32_t n) {
         const ChildRange children = tree.children(n);
         for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
@@ -87,7 +97,9 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         fits[n] = Fit(ellipsoids[n]);
         largest[n] = 1 - kRounding * fits[n].factor.norm() * fits[n].inverse.norm();
         if (children.count == 0) return;
-        hulls[n].emplace(tree.raw().hull(children.first / kBlockLanes));
+        const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
+        if (has_slab(record)) slabs[n] = slab_of(tree, record);
+        hulls[n].emplace(record);
         if (hulls[n]->share == 0) hulls[n].reset(); // it says nothing
         if (const Vec3 c = ellipsoids[n].center; hulls[n] && !in_hull(*hulls[n], Vec::Zero()))
             doubts[n].set(c.x, c.y, c.z);
@@ -101,7 +113,8 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
                 const double p[3] = {v.x, v.y, v.z};
                 for (uint32_t node = leaf;; node = parent[node]) {
                     if (!(radial_squared(ellipsoids[node], p) <= largest[node]) ||
-                        (hulls[node] && !in_hull(*hulls[node], fits[node].radial(to_vec(v)))))
+                        (hulls[node] && !in_hull(*hulls[node], fits[node].radial(to_vec(v)))) ||
+                        (slabs[node] && !in_slab(*slabs[node], to_vec(v))))
                         doubts[node].set(p[0], p[1], p[2]);
                     if (node == 0) break;
                 }

@@ -9,7 +9,9 @@
 #include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "src/hash.hpp"
+#include "src/hull.hpp"
 #include "src/layout.hpp"
+#include "src/slab.hpp"
 
 #include <prolate/version.hpp>
 
@@ -365,6 +367,20 @@ Result<Layout> check_layout(std::span<const std::byte> bytes, bool check_hash) {
     return out;
 }
 
+// Of the hull record at `at`.
+Result<void> check_slab(const std::byte* h, size_t at, uint32_t triangle_count) {
+    if (!has_slab(h + at)) {
+        const size_t found = first_nonzero(h, at + kHullPlane, at + kHullBytes);
+        return found < at + kHullBytes ? bad("a slab without a normal", found) : Result<void>{};
+    }
+    if (load_le<uint32_t>(h + at + kHullPlane) >= triangle_count)
+        return bad("a slab names a triangle that does not exist", at + kHullPlane);
+    const float low = load_le<float>(h + at + kHullLow), high = load_le<float>(h + at + kHullHigh);
+    if (!(std::isfinite(low) && std::isfinite(high) && low <= high))
+        return bad("heights of a slab out of range", at + kHullLow);
+    return {};
+}
+
 // One level's nodes: the only root, or the children of the level above.
 Result<void> check_families(NodeCheck& check, const LevelInfo* above) {
     if (above == nullptr) return check.family(1);
@@ -443,11 +459,12 @@ Result<void> TreeView::open_triangles(size_t hulls, bool check_hash) noexcept {
     const size_t vertices = hash + kSectionHashBytes;
     if (check_hash && section_hash(bytes_.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
         return bad("the triangles are damaged (hash mismatch)", hash);
-    for (size_t at = hulls; at < hash; at += kHullBytes)
-        if (const size_t found = first_nonzero(h, at + kHullReserved, at + kHullBytes); found < at + kHullBytes)
-            return bad("reserved bytes are not zero", found);
     vertex_count_ = load_le<uint32_t>(h + kAtVertexCount);
     triangle_count_ = load_le<uint32_t>(h + kAtTriangleCount);
+    for (size_t at = hulls; at < hash; at += kHullBytes) {
+        if (const auto sound = check_slab(h, at, triangle_count_); !sound) return sound;
+        raw_.has_slabs_ = raw_.has_slabs_ || has_slab(h + at);
+    }
     component_count_ = load_le<uint32_t>(h + kAtComponentCount);
     raw_.hulls_ = h + hulls;
     raw_.vertices_ = h + vertices;

@@ -10,7 +10,7 @@
 namespace prolate {
 
 /// The .etree format version that this library reads and writes (src/FORMAT.md).
-inline constexpr uint16_t kFormatVersion = 7;
+inline constexpr uint16_t kFormatVersion = 8;
 
 /// major * 10000 + minor * 100 + patch, as the headers say it.
 inline constexpr uint32_t kHeaderVersion =

@@ -5,6 +5,7 @@
 #include "query/triangle/ellipsoid_distance.hpp"
 #include "query/triangle/separation.hpp"
 #include "query/triangle/support.hpp"
+#include "src/slab.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -13,6 +14,8 @@ namespace {
 
 // Skins below this share of the first one are given up: nearly touching bodies gain nothing from them.
 constexpr float kLeastSkin = 0x1p-6f;
+// Of all lengths: planes that overlap by less are one.
+constexpr double kInOnePlane = 0x1p-28;
 
 } // namespace
 
@@ -54,13 +57,26 @@ bool CollideSearch::take(const MeetingPair& pair) noexcept {
     return !all;
 }
 
+double CollideSearch::reach_of_triangles() noexcept {
+    if (triangle_reach_ < 0) triangle_reach_ = triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance;
+    return triangle_reach_;
+}
+
+Slabs CollideSearch::slabs_of(const NodeWithHull& node_a, const NodeWithHull& node_b, const glm::dvec3& n) noexcept {
+    if (!may_tell(node_a, node_b, b_to_a, n)) return Slabs::say_nothing;
+    const double reach = reach_of_triangles(), least = double{options.margin} + skin;
+    const double gap = gap_of_slabs(node_a, node_b, b_to_a, reach);
+    if (gap > least) return Slabs::separated;
+    const auto flat = [](const NodeWithHull& at) { return at.hull != nullptr && has_slab(at.hull); };
+    return gap > least - kInOnePlane * reach && flat(node_a) && flat(node_b) ? Slabs::in_one_plane : Slabs::say_nothing;
+}
+
 // Are the triangles farther apart than margin + skin along this direction?
 bool CollideSearch::separated_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept {
-    if (triangle_reach_ < 0) triangle_reach_ = triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance;
     const glm::dvec3 n = normal / glm::length(normal);
     const double room = glm::dot(n, b_to_a.translation) - triangle_support(a.tree, in_a, n);
     return room - triangle_support(b.tree, in_b, -(n * b_to_a.rotation)) >
-           double{options.margin} + skin + kSeparationMargin * triangle_reach_;
+           double{options.margin} + skin + kSeparationMargin * reach_of_triangles();
 }
 
 bool CollideSearch::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept {

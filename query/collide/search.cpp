@@ -23,6 +23,9 @@
 #include "query/collide/search.hpp"
 #include "query/node/hull_lanes-inl.hpp"
 #include "query/node/side-inl.hpp"
+#include "src/slab.hpp"
+
+#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -33,8 +36,9 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
-// QueryContext::Entry::flags: which of the two nodes is to be opened, and whether the other is a leaf.
-constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2;
+// QueryContext::Entry::flags: which of the two nodes is to be opened, whether the other is a leaf, and whether slabs
+// have said what they can.
+constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2, kInOnePlane = 4;
 
 // Nodes of which p / (a + b) is greater may well be separated along n by their hulls, or triangles; below, a closer
 // look costs more than it saves.
@@ -73,9 +77,8 @@ private:
             const ChildRange children = children_in(side.block(node), node % kBlockLanes);
             if (children.count > budget()) return Verdict::undecided;
             pair_tests_ += children.count; // also those that it may not come to
-            if (children.count <= kBlockLanes
-                    ? test(open, children.first, children.count, other, e.flags & kOtherIsLeaf)
-                    : test_all(open, children, other, e.flags & kOtherIsLeaf))
+            if (children.count <= kBlockLanes ? test(open, children.first, children.count, other, e.flags)
+                                              : test_all(open, children, other, e.flags))
                 return stopped();
         }
         return Verdict::separated;
@@ -102,20 +105,36 @@ private:
         }
     };
 
+    // The hull record of an inner node, if it has one.
+    static const std::byte* hull_at(const Side& side, uint32_t slot) {
+        const std::byte* const block = side.block(slot);
+        const uint32_t at = slot % kBlockLanes;
+        if (side.hulls == nullptr || load_le<uint8_t>(block + kBlockCount + at) >= kTriangleLeaf) return nullptr;
+        return hull_of(side.hulls, block, at);
+    }
+
     // Are the hulls of a lane's node and of the other tree's node separated along n?
     HWY_NOINLINE bool hulls_separated(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
-        const auto reach = [](const Side& side, uint32_t slot, float x, float y, float z, float width) {
-            const std::byte* const block = side.block(slot);
-            const uint32_t at = slot % kBlockLanes;
-            if (side.hulls == nullptr || load_le<uint8_t>(block + kBlockCount + at) >= kTriangleLeaf) return width;
-            return hull_reach(hull_of(side.hulls, block, at), x, y, z, width);
+        const std::byte *const of_other = hull_at(sides_[open ^ kOpenB], other), *const own =
+                                                                                     hull_at(sides_[open], node);
+        const auto reach = [](const std::byte* hull, float x, float y, float z, float width) {
+            return hull != nullptr ? hull_reach(hull, x, y, z, width) : width;
         };
         const float a = kept.a[lane], b = kept.b[lane];
-        const float reach_a =
-            reach(sides_[open ^ kOpenB], other, kept.in_a[0][lane], kept.in_a[1][lane], kept.in_a[2][lane], a);
-        const float reach_b =
-            reach(sides_[open], node, -kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
+        const float reach_a = reach(of_other, kept.in_a[0][lane], kept.in_a[1][lane], kept.in_a[2][lane], a);
+        const float reach_b = reach(own, -kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
         return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
+    }
+    // What their slabs say.
+    HWY_NOINLINE Slabs slabs_of(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
+        const std::byte *const of_other = hull_at(sides_[open ^ kOpenB], other), *const own =
+                                                                                     hull_at(sides_[open], node);
+        const auto flat = [](const std::byte* hull) { return hull != nullptr && has_slab(hull); };
+        if (!flat(of_other) && !flat(own)) return Slabs::say_nothing;
+        const glm::dvec3 n =
+            glm::normalize(glm::dvec3(kept.n[0][lane], kept.n[1][lane], kept.n[2][lane])); // in its frame
+        return open != 0 ? s_.slabs_of({s_.a.tree, other, of_other}, {s_.b.tree, node, own}, s_.b_to_a.rotation * n)
+                         : s_.slabs_of({s_.a.tree, node, own}, {s_.b.tree, other, of_other}, n);
     }
 
     Verdict stopped() const { return s_.out_of_tests ? Verdict::undecided : Verdict::overlapping; }
@@ -127,7 +146,8 @@ private:
 
     // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
-    HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t other_is_leaf) {
+    HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t of_parent) {
+        const uint32_t other_is_leaf = of_parent & kOtherIsLeaf, in_one_plane = of_parent & kInOnePlane;
         Side& side = sides_[open];
         const std::byte* const block = side.block(first);
         ++block_tests_;
@@ -155,7 +175,8 @@ private:
             meet &= ~leaves;
         }
         const uint32_t opened = ~leaves & (other_is_leaf != 0 ? 0xff : larger);
-        const uint32_t if_opened = open | other_is_leaf, if_other_opened = open ^ kOpenB;
+        const uint32_t if_opened = open | other_is_leaf | in_one_plane,
+                       if_other_opened = (open ^ kOpenB) | in_one_plane;
         uint32_t deepest = size_;
         float least = HUGE_VALF;
         for (; meet != 0; meet &= meet - 1) {
@@ -163,8 +184,13 @@ private:
             const uint32_t node = first + lane;
             if (have_hulls_ && kept.depth[lane] > kNearlySeparated && hulls_separated(open, node, other, kept, lane))
                 continue;
-            const uint32_t flags =
+            uint32_t flags =
                 (opened >> lane & 1) != 0 ? if_opened : if_other_opened | (leaves >> lane & 1) * kOtherIsLeaf;
+            if (have_slabs_ && in_one_plane == 0) {
+                const Slabs slabs = slabs_of(open, node, other, kept, lane);
+                if (slabs == Slabs::separated) continue;
+                if (slabs == Slabs::in_one_plane) flags |= kInOnePlane;
+            }
             if (kept.depth[lane] < least) least = kept.depth[lane], deepest = size_;
             stack_[size_++] = {open != 0 ? other : node, open != 0 ? node : other, kept.depth[lane], flags};
         }
@@ -193,9 +219,9 @@ private:
     }
 
     // Some or all children, where that is rare: in a loop with the usual case this would cost it registers.
-    HWY_NOINLINE bool test_all(uint32_t open, ChildRange children, uint32_t other, uint32_t other_is_leaf) {
+    HWY_NOINLINE bool test_all(uint32_t open, ChildRange children, uint32_t other, uint32_t of_parent) {
         return !for_each_block(
-            children, [&](uint32_t first, uint32_t count) { return !test(open, first, count, other, other_is_leaf); });
+            children, [&](uint32_t first, uint32_t count) { return !test(open, first, count, other, of_parent); });
     }
 
     // options.margin + skin in lattice steps, rounded up.
@@ -213,6 +239,7 @@ private:
     uint32_t size_ = 0;
     uint64_t pair_tests_ = 0, block_tests_ = 0;
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
+    const bool have_slabs_ = s_.a.has_slabs || s_.b.has_slabs;
     Side sides_[2];
 };
 

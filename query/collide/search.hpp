@@ -5,6 +5,7 @@
 #include "query/node/limits.hpp"
 #include "query/node/order.hpp"
 #include "query/node/tree_side.hpp"
+#include "query/triangle/slab.hpp"
 
 #include <prolate/collide.hpp>
 
@@ -12,6 +13,10 @@
 #include <span>
 
 namespace prolate::query {
+
+/// Of two nodes: they are farther apart than margin + skin; or they are flat and lie so nearly in one plane that slabs
+/// of what is below them will not tell, either.
+enum class Slabs : uint8_t { say_nothing, separated, in_one_plane };
 
 struct CollideSearch {
     TreeSide a, b;
@@ -43,6 +48,9 @@ struct CollideSearch {
     /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query. `normal` is 0, or
     /// of any length, in A's frame, from A to B, and along it they may well be separated.
     bool meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& normal) noexcept;
+    /// What slabs say of the triangles below two nodes. n is of length 1 but for rounding, in A's frame, and nearly
+    /// separates them.
+    Slabs slabs_of(const NodeWithHull& node_a, const NodeWithHull& node_b, const glm::dvec3& n) noexcept;
     /// Takes a pair that meets. True to stop the query.
     bool take(const MeetingPair& pair) noexcept;
     /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any. False
@@ -60,6 +68,7 @@ private:
     template <class FartherThan> bool separated_by_margin(FartherThan&& farther_than) noexcept;
     bool separated_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept;
     float least_skin_ = 0;
+    double reach_of_triangles() noexcept;
     double triangle_reach_ = -1; // S of query/triangle/support.hpp, once it is asked for
 };
 

@@ -42,6 +42,10 @@ double root_bound(const DistanceSearch& search) noexcept {
     return bound > 0 ? bound : 0;
 }
 
+double DistanceSearch::slabs_apart(const NodeWithHull& node_a, const NodeWithHull& node_b) const noexcept {
+    return gap_of_slabs(node_a, node_b, b_to_a, triangle_reach_);
+}
+
 void DistanceSearch::take(const TriangleDistance& found, const MeetingPair& pair, double bound, bool meet) noexcept {
     // Apart, but perhaps by no more than the bound's own rounding.
     decided = std::min(decided, meet ? 0 : std::max({found.lower, bound, std::numeric_limits<double>::min()}));

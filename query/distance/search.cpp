@@ -30,12 +30,14 @@
 #include "query/node/heap.hpp"
 #include "query/node/side-inl.hpp"
 #include "src/layout.hpp"
+#include "src/slab.hpp"
 
 #include <hwy/cache_control.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 HWY_BEFORE_NAMESPACE();
@@ -57,8 +59,19 @@ struct DistanceSide : Side<PlacedNodeWithBox> {
     alignas(64) double skipped[kBlockLanes]; // least bound of the nodes that were skipped in each lane, steps
 };
 
-// QueryContext::Entry::bound is the pair's, less that of the roots.
-class DistanceTraversal {
+// The least bound first; of equal ones, which flat faces have by the thousand, what lies opposite each other.
+struct ByBoundAndCenters {
+    using Entry = QueryContext::Entry;
+    static constexpr uint32_t kFlags = kOpenB | kLeaves;
+    static bool before(const Entry& x, const Entry& y) {
+        return x.bound < y.bound || (x.bound == y.bound && (x.flags & ~kFlags) < (y.flags & ~kFlags));
+    }
+    // Bits of an entry's flags, for the distance of its centers: a float's, as integers in the same order.
+    static uint32_t flags(float between) { return std::bit_cast<uint32_t>(between) & ~kFlags; }
+};
+
+// QueryContext::Entry::bound is the pair's, less that of the roots. kSlabs: a tree has slabs (query/triangle/slab.hpp).
+template <bool kSlabs> class DistanceTraversal {
     using Entry = QueryContext::Entry;
 
 public:
@@ -146,6 +159,13 @@ private:
         ++s_.stats.pair_tests, ++s_.stats.block_tests;
         const double bound = bounds.lower[0] * sides_[1].step;
         base_ = std::isfinite(bound) ? std::max(bound, 0.0) : root_bound(s_);
+        if constexpr (kSlabs) {
+            const auto root = [](const DistanceSide& side) {
+                return NodeWithHull{side.tree, 0,
+                                    side.tree.is_leaf(0) ? nullptr : hull_of(side.hulls, side.block(0), 0)};
+            };
+            base_ = std::max(base_, s_.slabs_apart(root(sides_[0]), root(sides_[1])));
+        }
         e = {0, 0, 0, root_flags(s_.a.tree, s_.b.tree, bounds.size[0] > one.single.size)};
         return !skips(base_);
     }
@@ -199,18 +219,40 @@ private:
             const bool leaf = (leaves >> lane & 1) != 0;
             double lower = bounds.lower[lane] * side.step; // less than 0: the deeper, the nearer
             if (have_hulls_) {
-                lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one,
-                                               leaf ? nullptr : hull_of(side.hulls, block, lane));
+                const std::byte* const hull = leaf ? nullptr : hull_of(side.hulls, block, lane);
+                lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one, hull);
                 if (skips(lower)) continue;
+                if (kSlabs && (may_have_slab(hull_one) || may_have_slab(hull))) {
+                    lower = slabs_add(lower, bounds, lane, open, other, hull_one, first + lane, hull);
+                    if (skips(lower)) continue;
+                }
             }
             const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
             if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
-            const uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
-            if (count_ == 0 || lower < least_) nearest_ = count_, least_ = lower;
+            uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
+            bool nearest = count_ == 0 || lower < least_;
+            if constexpr (kSlabs) {
+                const auto between = static_cast<float>(side.step * bounds.between[lane]); // metres
+                flags |= ByBoundAndCenters::flags(between);
+                const bool equal = std::abs(lower - least_) <= double{kept_less_};
+                nearest = count_ == 0 || (equal ? between < least_between_ : lower < least_);
+                if (nearest) least_between_ = between;
+            }
+            if (nearest) nearest_ = count_, least_ = lower;
             const float bound = inherit(e.bound, lower);
             const uint32_t node = first + lane;
             children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
         }
+    }
+    static HWY_INLINE bool may_have_slab(const std::byte* hull) { return hull != nullptr && has_slab(hull); }
+    // What a lane's bound becomes by slabs, of which one at least of the two nodes has any.
+    HWY_NOINLINE double slabs_add(double lower, const LaneBounds& bounds, uint32_t lane, uint32_t open, uint32_t other,
+                                  const std::byte* hull_other, uint32_t node, const std::byte* hull) const {
+        const glm::dvec3 along(bounds.n[0][lane], bounds.n[1][lane], bounds.n[2][lane]);
+        const NodeWithHull here{sides_[open].tree, node, hull}, there{sides_[open ^ kOpenB].tree, other, hull_other};
+        const NodeWithHull &a = open != 0 ? there : here, &b = open != 0 ? here : there;
+        const bool useful = may_tell(a, b, s_.b_to_a, open != 0 ? s_.b_to_a.rotation * along : along);
+        return useful ? std::max(lower, s_.slabs_apart(a, b)) : lower;
     }
     static HWY_INLINE void note_skipped(const LaneBounds& bounds, uint32_t lanes, DistanceSide& side) {
         if (lanes == 0) return;
@@ -225,7 +267,7 @@ private:
     // The greater of a pair's own bound, as it is kept, and its parent's.
     float inherit(float parent, double bound) const {
         const float own = static_cast<float>(bound - base_);
-        const float below = own - (std::abs(own) * 0x1p-22f + 0x1p-120f);
+        const float below = own - (std::abs(own) * 0x1p-22f + kept_less_);
         return below > parent ? below : parent;
     }
 
@@ -252,19 +294,25 @@ private:
     }
 
     DistanceSearch& s_;
-    PairHeap<> heap_;
+    PairHeap<std::conditional_t<kSlabs, ByBoundAndCenters, ByBound>> heap_;
     DistanceSide sides_[2];
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
-    double base_ = 0;      // bound of the roots, metres
-    uint32_t room_;        // of the heap: what depth_first() needs is kept free
+    double base_ = 0; // bound of the roots, metres
+    uint32_t room_;   // of the heap: what depth_first() needs is kept free
+    // Kept bounds are less by this: of slabs by their rounding, so that equal ones are equal.
+    const float kept_less_ = kSlabs ? static_cast<float>(0x1p-43 * s_.reach_of_triangles()) : 0x1p-120f;
     uint32_t count_ = 0;   // of children_
     uint32_t nearest_ = 0; // of them, while they are tested, and its own bound
     double least_ = 0;
+    float least_between_ = 0; // of its centers
     Entry children_[kMaxDegree];
 };
 
 void traverse_target(DistanceSearch& search) {
-    DistanceTraversal(search).run();
+    if (search.a.has_slabs || search.b.has_slabs)
+        DistanceTraversal<true>(search).run();
+    else
+        DistanceTraversal<false>(search).run();
 }
 
 } // namespace

@@ -7,6 +7,7 @@
 #include "query/node/order.hpp"
 #include "query/node/tree_side.hpp"
 #include "query/triangle/distance.hpp"
+#include "query/triangle/slab.hpp"
 
 #include <prolate/distance.hpp>
 
@@ -55,9 +56,14 @@ struct DistanceSearch {
     double tolerance(double distance) const {
         return std::max(options.tolerance_absolute, options.tolerance_relative * distance);
     }
+    double reach_of_triangles() const { return triangle_reach_; } ///< S of query/triangle/support.hpp
     /// Tests left of the budget.
     uint64_t left() const { return tests_left(options.max_pair_tests, stats.tests()); }
     double lower() const { return std::max(0.0, std::min({decided, skipped, open, upper})); }
+
+    /// A lower bound on the distance of what is below two nodes, from slabs (query/triangle/slab.hpp): not positive, or
+    /// NaN, if they say nothing.
+    double slabs_apart(const NodeWithHull& node_a, const NodeWithHull& node_b) const noexcept;
 
     /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing
     /// done, if the budget may not suffice.

@@ -48,8 +48,9 @@ namespace prolate::query::HWY_NAMESPACE {
 /// positive if the nodes are not found separated. Lanes without a node have any.
 struct LaneBounds {
     alignas(64) double lower[kBlockLanes];
-    alignas(64) float n[3][kBlockLanes]; ///< of length 1 but for rounding
-    alignas(64) float size[kBlockLanes]; ///< |L2|
+    alignas(64) float n[3][kBlockLanes];    ///< of length 1 but for rounding
+    alignas(64) float size[kBlockLanes];    ///< |L2|
+    alignas(64) float between[kBlockLanes]; ///< |c2 - c1|
     /// If boxes were given: how far the single reaches along n, and the lane along -n, from their centers; L1^T n and
     /// L2^T n, and their lengths.
     alignas(64) float reach_a[kBlockLanes], reach_b[kBlockLanes];
@@ -153,6 +154,7 @@ HWY_INLINE void bound_lanes(const std::byte* block, int32_t step_exponent, const
         const Float3 n = bounding_direction(e, q2, size, one);
         store(reach_of_both(e, size, n, one, box, boxes, i, out), reach + i);
         store(n, out.n, i), store(e.center, center, i), store(size, out.size + i);
+        store(length(between(e, one)), out.between + i);
     }
     bound_along(center, reach, one, enough, out);
 }

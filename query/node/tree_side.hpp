@@ -18,6 +18,7 @@ struct TreeSide {
     const LatticeInfo lattice;
     const std::byte *blocks, *bounding_blocks;
     const std::byte* hulls; ///< null without triangles
+    bool has_slabs;         ///< some of these records do
     uint32_t leaves_from;   ///< slots from here on are leaves: the last level of the bytes
     uint32_t limit_from;    ///< slots from here on are too deep for QueryOptions::max_level to be opened
     uint32_t deepest = 0;   ///< largest slot that was tested

@@ -27,7 +27,7 @@ double triangle_support(const TreeView& tree, const TriangleRange& range, const 
 }
 
 double triangle_reach(const TreeView& tree) noexcept {
-    return place(tree.root()).reach;
+    return place(tree.root_bound()).reach;
 }
 
 } // namespace prolate::query

@@ -16,7 +16,8 @@ namespace prolate::query {
 /// The greatest n.x of the corners x of some triangles, body frame.
 double triangle_support(const TreeView& tree, const TriangleRange& range, const glm::dvec3& n) noexcept;
 
-/// Bounds the distance of an exact tree's corners from its frame's origin: they lie in the root.
+/// Bounds the distance of an exact tree's corners, or of another's ellipsoids, from its frame's origin: they lie in the
+/// root's bounding volume.
 double triangle_reach(const TreeView& tree) noexcept;
 
 } // namespace prolate::query

@@ -5,6 +5,7 @@
 #include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "src/hull.hpp"
+#include "src/slab.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
@@ -442,6 +443,88 @@ TEST(ExactTree, TheProofNoticesAHullThatIsTooSmall) {
     }
 }
 
+// Nodes of an exact tree that have a slab, with all corners below each.
+template <class Visit> uint32_t for_each_slab(const TreeView& tree, Visit&& visit) {
+    uint32_t count = 0;
+    const auto corners = [&](const auto& self, uint32_t node, std::vector<Vec3>& out) -> void {
+        const TriangleRange range = tree.triangles(node);
+        for (uint32_t t = range.first; t < range.first + range.count; ++t)
+            for (const uint32_t corner : tree.triangle(t)) out.push_back(tree.vertex(corner));
+        const ChildRange children = tree.children(node);
+        for (uint32_t i = 0; i < children.count; ++i) self(self, children.first + i, out);
+    };
+    tree.for_each_node([&](uint32_t node) {
+        const ChildRange children = tree.children(node);
+        if (children.count == 0) return;
+        const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
+        if (!has_slab(record)) return;
+        std::vector<Vec3> below;
+        corners(corners, node, below);
+        visit(node, slab_of(tree, record), below), ++count;
+    });
+    return count;
+}
+
+Mesh turned(Mesh mesh, const Quat& rotation) {
+    for (Vec3& v : mesh.vertices) v = scenes::to_float(scenes::rotate(rotation, {v.x, v.y, v.z}));
+    return mesh;
+}
+
+TEST(ExactTree, SlabsHoldTheirTrianglesAndAreThin) {
+    scenes::Random random(11);
+    const Mesh plate = shapes::box(1, 1, 0.1f), sheet = shapes::sheet(1, 1, 20);
+    for (const Mesh& mesh :
+         {sheet, turned(sheet, random.rotation()), shapes::moved(turned(sheet, random.rotation()), {3, -5, 7}, 100),
+          plate, shapes::icosphere(3)}) {
+        const Build built = must_build(mesh);
+        const TreeView tree = built.tree.view();
+        const uint32_t flat = for_each_slab(tree, [&](uint32_t node, const Slab& slab, const std::vector<Vec3>& below) {
+            const Ellipsoid e = tree.ellipsoid(node);
+            ASSERT_LT(slab.high - slab.low, 1e-3 * std::hypot(e.l11, e.l21, e.l31));
+            for (const Vec3& v : below) {
+                const long double p[3] = {v.x, v.y, v.z};
+                long double height = 0;
+                for (size_t i = 0; i < 3; ++i) height += slab.normal[i] * (p[i] - slab.origin[i]);
+                ASSERT_TRUE(slab.low <= height && height <= slab.high);
+            }
+        });
+        if (mesh.triangles.size() == sheet.triangles.size()) {
+            const std::byte* const of_root = tree.raw().hull(tree.children(0).first / kBlockLanes);
+            EXPECT_TRUE(has_slab(of_root));
+            EXPECT_GT(flat, 10u);
+        } else if (mesh.triangles.size() > plate.triangles.size()) {
+            EXPECT_EQ(flat, 0u); // a ball has no flat sides
+        }
+    }
+}
+
+// The bytes of the tree with the slab of `node` moved up by `by`, metres.
+std::vector<std::byte> with_bad_slab(const Tree& tree, uint32_t node, float by) {
+    const TreeView view = tree.view();
+    const std::byte* const from = view.raw().hull(0);
+    std::vector<std::byte> bytes(tree.bytes().begin(), tree.bytes().end());
+    std::vector<std::byte> hulls(from, from + view.block_count() * kHullBytes);
+    std::byte* const slab = hulls.data() + size_t{view.children(node).first / kBlockLanes} * kHullBytes;
+    for (const size_t at : {kHullLow, kHullHigh}) store_le(slab + at, load_le<float>(slab + at) + by);
+    format::store_hulls(bytes, hulls);
+    return bytes;
+}
+
+TEST(ExactTree, TheProofNoticesASlabBesideItsTriangles) {
+    const Mesh mesh = shapes::sheet(1, 1, 20);
+    const Build built = must_build(mesh);
+    const auto sound = verify(built.tree.view(), mesh.view());
+    ASSERT_TRUE(sound && sound->covered);
+    for (const float by : {1e-12f, -1e-12f}) {
+        const auto bytes = with_bad_slab(built.tree, 0, by);
+        const auto bad = TreeView::open(bytes);
+        ASSERT_TRUE(bad) << bad.error().what;
+        const auto proof = verify(*bad, mesh.view());
+        ASSERT_TRUE(proof);
+        EXPECT_FALSE(proof->covered || proof->levels[0].covered);
+    }
+}
+
 TEST(ExactTree, APrefixCoversTheSurface) {
     const Mesh mesh = shapes::torus(1, 0.3f, 24, 12);
     const Build built = must_build(mesh);
@@ -574,6 +657,65 @@ TEST(ExactQuery, AgreesWithBruteForceNearContact) {
             }
     EXPECT_GT(apart, 400u);
     EXPECT_GT(meeting, 400u);
+}
+
+// Flat bodies that are parallel, or nearly: what their slabs say.
+struct Flats {
+    Body a{shapes::sheet(1, 1, 20)}, b{shapes::sheet(0.8f, 0.8f, 17)};
+    // B above A by `gap`, tilted by `tilt` radians, and both turned.
+    Query at(scenes::Random& random, double gap, double tilt) const {
+        const Quat turn = random.rotation();
+        const auto half = static_cast<float>(tilt / 2);
+        const Quat own{turn.w * half + turn.x, turn.z * half + turn.y, turn.z - turn.y * half, turn.w - turn.x * half};
+        const Point place = scenes::rotate(turn, {random.in(-0.2, 0.4), random.in(-0.2, 0.4), gap});
+        return {{{}, turn}, {scenes::to_float(place), own}};
+    }
+};
+
+TEST(ExactQuery, FlatBodiesAgreeWithBruteForce) {
+    const Flats flats;
+    scenes::Random random(12);
+    QueryContext context;
+    uint32_t separated = 0, few = 0, parallel = 0;
+    for (int i = 0; i < 200; ++i) {
+        const double gap = i % 10 == 0 ? 0 : random.log_in(1e-7, 0.04),
+                     tilt = i % 2 == 0 ? 0 : random.log_in(1e-8, 1e-2);
+        const Query q = flats.at(random, gap, tilt);
+        const TreeView a = flats.a.built.tree.view(), b = flats.b.built.tree.view();
+        const auto truth = static_cast<double>(Truth(flats.a.mesh, flats.b.mesh, q).least);
+        if (truth >= static_cast<double>(Truth::kFar)) continue;
+        const DistanceResult d = distance(a, q.a, b, q.b, context);
+        ASSERT_LE(d.lower, truth * (1 + 1e-12));
+        ASSERT_GE(d.upper, truth * (1 - 1e-6) - 1e-13);
+        ASSERT_LE(d.upper - d.lower, 1e-6 * d.upper + 1e-12);
+        const CollideResult c = collide(a, q.a, b, q.b, context);
+        if (truth == 0) {
+            ASSERT_EQ(c.verdict, Verdict::overlapping);
+        } else if (truth > 1e-11) {
+            ASSERT_EQ(c.verdict, Verdict::separated);
+            ++separated;
+        }
+        if (tilt == 0 && gap > 1e-6) ++parallel, few += d.stats.tests() < 500 && c.stats.tests() < 20;
+    }
+    EXPECT_GT(separated, 100u);
+    EXPECT_GT(parallel, 50u);
+    EXPECT_EQ(few, parallel); // of 800 x 578 triangles that are equally near
+}
+
+// That the test above would notice slabs that lie beside their triangles.
+TEST(ExactQueryHarness, CatchesSlabsThatAreTooThin) {
+    const Flats flats;
+    scenes::Random random(13);
+    QueryContext context;
+    uint32_t wrong = 0;
+    const auto bytes = with_bad_slab(flats.a.built.tree, 0, -0.1f);
+    const TreeView bad = *TreeView::open(bytes);
+    for (int i = 0; i < 20; ++i) {
+        const Query q = flats.at(random, -1e-3, 1e-2);
+        if (Truth(flats.a.mesh, flats.b.mesh, q).least > 0) continue; // they cross beside A
+        wrong += collide(bad, q.a, flats.b.built.tree.view(), q.b, context).verdict == Verdict::separated;
+    }
+    EXPECT_GT(wrong, 10u);
 }
 
 // That the test above would notice hulls that are too small.

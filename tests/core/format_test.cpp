@@ -5,6 +5,8 @@
 #include "src/block.hpp"
 #include "src/bytes.hpp"
 #include "src/format.hpp"
+#include "src/hull.hpp"
+#include "src/slab.hpp"
 #include "tests/scenes.hpp"
 
 #include <prolate/tree.hpp>
@@ -115,6 +117,10 @@ Bytes golden_exact() {
     Bytes hulls(kGoldenBlocks * kHullBytes); // block 1: the root's children
     for (size_t i = 0; i < 48; ++i) hulls[kHullBytes + i] = static_cast<std::byte>((5 * i + 136) % 256);
     hulls[kHullBytes + 48] = std::byte{17};
+    std::byte* const slab = hulls.data() + kHullBytes; // not one that its triangles lie in
+    store_le(slab + kHullNormal + 1, int8_t{-127});
+    store_le(slab + kHullPlane, uint32_t{2});
+    store_le(slab + kHullLow, -0.25f), store_le(slab + kHullHigh, 0.5f);
     format::store_hulls(bytes, hulls);
     return bytes;
 }
@@ -220,7 +226,7 @@ void expect_sound(const TreeView& tree) {
 }
 
 TEST(Format, GoldenExactFileOfVersionSix) {
-    const Bytes file = golden_file("golden_v7_exact.etree", golden_exact());
+    const Bytes file = golden_file("golden_v8_exact.etree", golden_exact());
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
     const auto tree = TreeView::open(file);
@@ -242,6 +248,12 @@ TEST(Format, GoldenExactFileOfVersionSix) {
     EXPECT_EQ(tree->raw().hull(1)[1], std::byte{141});
     EXPECT_EQ(tree->raw().hull(1)[48], std::byte{17});
     EXPECT_EQ(tree->raw().hull(2)[48], std::byte{0});
+    ASSERT_TRUE(has_slab(tree->raw().hull(1)) && !has_slab(tree->raw().hull(2)));
+    const Slab slab = slab_of(*tree, tree->raw().hull(1)); // in the plane of triangle 2: 0, 2, 4
+    EXPECT_EQ(slab.low, -0.25);
+    EXPECT_EQ(slab.high, 0.5);
+    const double apart[3] = {0, 0.75, 0};
+    EXPECT_EQ(std::abs(slab.height(apart)), 0.75);
 }
 
 TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
@@ -262,7 +274,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
 }
 
 TEST(Format, GoldenFileOfVersionSix) {
-    const Bytes file = golden_file("golden_v7.etree", golden());
+    const Bytes file = golden_file("golden_v8.etree", golden());
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
     const auto tree = TreeView::open(file);
@@ -467,7 +479,8 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 TEST(Format, OlderVersionsAreRefusedInWords) {
     for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree",
                              "golden_v3_exact.etree", "golden_v4.etree", "golden_v4_exact.etree", "golden_v5.etree",
-                             "golden_v5_exact.etree", "golden_v6.etree", "golden_v6_exact.etree"}) {
+                             "golden_v5_exact.etree", "golden_v6.etree", "golden_v6_exact.etree",
+                             "golden_v7.etree", "golden_v7_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {
@@ -573,7 +586,7 @@ TEST(Format, NamesTheFirstOffence) {
         {kBlocks + 144, {18}, ErrorCode::bad_file, kBlocks + 144},         // 22 above the step exponent, -4
         {kBlocks + 144, {0xdd}, ErrorCode::bad_file, kBlocks + 144},       // 31 below
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
-        {8, {8}, ErrorCode::newer_version, 8},
+        {8, {9}, ErrorCode::newer_version, 9},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -674,9 +687,12 @@ TEST(Format, NamesTheFirstOffence) {
         {exact_counts + 1, {130}, ErrorCode::bad_file, kExactBlock2 + 188},   // one that the next leaf has too
         {kExactBlock2 + 154, {130}, ErrorCode::bad_file, 120},                // one more than there are
         {exact_counts, {131}, ErrorCode::bad_file, kExactBlock1},             // an inner node's children as triangles
-        {kExactEnd + 64 + 49, {1}, ErrorCode::bad_file, kExactEnd + 64 + 49}, // reserved bytes of a hull
-        {kExactEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kExactEnd + 2 * 64 + 63},            // likewise
-        {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8},           // not finite
+        {kExactEnd + 64 + 50, {0}, ErrorCode::bad_file, kExactEnd + 64 + 52}, // a slab without a normal
+        {kExactEnd + 2 * 64 + 63, {1}, ErrorCode::bad_file, kExactEnd + 2 * 64 + 63},  // likewise
+        {kExactEnd + 64 + 52, {5}, ErrorCode::bad_file, kExactEnd + 64 + 52},          // its triangle does not exist
+        {kExactEnd + 64 + 58, {0xc0, 0x7f}, ErrorCode::bad_file, kExactEnd + 64 + 56}, // its height is a NaN
+        {kExactEnd + 64 + 62, {0x80, 0xbf}, ErrorCode::bad_file, kExactEnd + 64 + 56}, // its top below its bottom
+        {section + 8 + 3, {0x7f, 0, 0, 0x80, 0x7f}, ErrorCode::bad_file, section + 8}, // not finite
         {section + 8 + 7 * 12 + 2 * 6 + 4, {7}, ErrorCode::bad_file, section + 8 + 7 * 12 + 12}, // no such vertex
     };
     const auto check = [](const Case& c, Bytes bytes) {
@@ -900,7 +916,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 7); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 8); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

@@ -42,6 +42,9 @@ public:
     /// `b` is the block of the node's first child.
     const std::byte* hull(uint32_t b) const noexcept { return hulls_ + size_t{b} * kHullBytes; }
 
+    /// Does any hull record have a slab (src/slab.hpp)?
+    bool has_slabs() const noexcept { return has_slabs_; }
+
     /// Of a tree with triangles: all vertices, three floats each, and all triangles, three vertex indices each, of two
     /// bytes if vertex_count() <= 65536, else of four. Little-endian, without alignment.
     const std::byte* vertices() const noexcept { return vertices_; }
@@ -55,6 +58,7 @@ private:
     const std::byte* hulls_ = nullptr;     // null without triangles
     const std::byte* vertices_ = nullptr;  // null without triangles
     const std::byte* triangles_ = nullptr; // null without triangles
+    bool has_slabs_ = false;
     LatticeInfo lattice_;
 };
 
