@@ -15,12 +15,12 @@
 namespace prolate {
 
 inline constexpr size_t kHullPoints = 16;
-inline constexpr size_t kHullPoint = 0;     ///< i8[3][16]: q, first coordinates first
-inline constexpr size_t kHullShare = 48;    ///< u8: the share, 255ths; 0: nothing is known of this node
-inline constexpr size_t kHullNormal = 49;   ///< i8[3]: the plane's unit normal, 127ths; 0: there is no slab
-inline constexpr size_t kHullPlane = 52;    ///< u32: a triangle in the plane
-inline constexpr size_t kHullLow = 56;      ///< f32: least height of a corner over it, metres
-inline constexpr size_t kHullHigh = 60;     ///< f32: greatest height
+inline constexpr size_t kHullPoint = 0;   ///< i8[3][16]: q, first coordinates first
+inline constexpr size_t kHullShare = 48;  ///< u8: the share, 255ths; 0: nothing is known of this node
+inline constexpr size_t kHullNormal = 49; ///< i8[3]: the plane's unit normal, 127ths; 0: there is no slab
+inline constexpr size_t kHullPlane = 52;  ///< u32: a triangle in the plane
+inline constexpr size_t kHullLow = 56;    ///< f32: least height of a corner over it, metres
+inline constexpr size_t kHullHigh = 60;   ///< f32: greatest height
 inline constexpr double kHullUnit = 127, kHullShares = 255;
 static_assert(kHullHigh + sizeof(float) == kHullBytes);
 

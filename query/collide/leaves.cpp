@@ -15,7 +15,7 @@ namespace {
 // Skins below this share of the first one are given up: nearly touching bodies gain nothing from them.
 constexpr float kLeastSkin = 0x1p-6f;
 // Of all lengths: planes that overlap by less are one.
-constexpr double kInOnePlane = 0x1p-28;
+constexpr double kInOnePlane = 0x1p-36;
 
 } // namespace
 

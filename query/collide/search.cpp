@@ -125,6 +125,8 @@ private:
         const float reach_b = reach(own, -kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
         return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
     }
+    // Of the roots, and once there are more pairs than usual: much is equally near.
+    bool slabs_pay() const { return have_slabs_ && (block_tests_ == 1 || block_tests_ > kPatience); }
     // What their slabs say.
     HWY_NOINLINE Slabs slabs_of(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
         const std::byte *const of_other = hull_at(sides_[open ^ kOpenB], other), *const own =
@@ -186,7 +188,7 @@ private:
                 continue;
             uint32_t flags =
                 (opened >> lane & 1) != 0 ? if_opened : if_other_opened | (leaves >> lane & 1) * kOtherIsLeaf;
-            if (have_slabs_ && in_one_plane == 0) {
+            if (slabs_pay() && in_one_plane == 0) {
                 const Slabs slabs = slabs_of(open, node, other, kept, lane);
                 if (slabs == Slabs::separated) continue;
                 if (slabs == Slabs::in_one_plane) flags |= kInOnePlane;

@@ -70,15 +70,15 @@ struct ByBoundAndCenters {
     static uint32_t flags(float between) { return std::bit_cast<uint32_t>(between) & ~kFlags; }
 };
 
-// QueryContext::Entry::bound is the pair's, less that of the roots. kSlabs: a tree has slabs (query/triangle/slab.hpp).
-template <bool kSlabs> class DistanceTraversal {
+// QueryContext::Entry::bound is the pair's, less that of the roots. kFlat: the roots end with faces that are parallel.
+template <bool kFlat> class DistanceTraversal {
     using Entry = QueryContext::Entry;
 
 public:
-    explicit DistanceTraversal(DistanceSearch& search)
+    DistanceTraversal(DistanceSearch& search, double by_slabs) // a bound on the distance of the roots
         : s_(search),
           heap_(search.entries), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}},
-          room_(heap_room(search.a.tree, search.b.tree)) {}
+          by_slabs_(by_slabs), room_(heap_room(search.a.tree, search.b.tree)) {}
 
     void run() {
         search();
@@ -159,13 +159,7 @@ private:
         ++s_.stats.pair_tests, ++s_.stats.block_tests;
         const double bound = bounds.lower[0] * sides_[1].step;
         base_ = std::isfinite(bound) ? std::max(bound, 0.0) : root_bound(s_);
-        if constexpr (kSlabs) {
-            const auto root = [](const DistanceSide& side) {
-                return NodeWithHull{side.tree, 0,
-                                    side.tree.is_leaf(0) ? nullptr : hull_of(side.hulls, side.block(0), 0)};
-            };
-            base_ = std::max(base_, s_.slabs_apart(root(sides_[0]), root(sides_[1])));
-        }
+        base_ = std::max(base_, by_slabs_);
         e = {0, 0, 0, root_flags(s_.a.tree, s_.b.tree, bounds.size[0] > one.single.size)};
         return !skips(base_);
     }
@@ -222,7 +216,7 @@ private:
                 const std::byte* const hull = leaf ? nullptr : hull_of(side.hulls, block, lane);
                 lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one, hull);
                 if (skips(lower)) continue;
-                if (kSlabs && (may_have_slab(hull_one) || may_have_slab(hull))) {
+                if (slabs_pay() && (may_have_slab(hull_one) || may_have_slab(hull))) {
                     lower = slabs_add(lower, bounds, lane, open, other, hull_one, first + lane, hull);
                     if (skips(lower)) continue;
                 }
@@ -231,7 +225,7 @@ private:
             if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
             uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
             bool nearest = count_ == 0 || lower < least_;
-            if constexpr (kSlabs) {
+            if constexpr (kFlat) {
                 const auto between = static_cast<float>(side.step * bounds.between[lane]); // metres
                 flags |= ByBoundAndCenters::flags(between);
                 const bool equal = std::abs(lower - least_) <= double{kept_less_};
@@ -244,6 +238,8 @@ private:
             children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
         }
     }
+    // Once there are more pairs than usual: much is equally near.
+    bool slabs_pay() const { return have_slabs_ && s_.stats.block_tests > kPatience; }
     static HWY_INLINE bool may_have_slab(const std::byte* hull) { return hull != nullptr && has_slab(hull); }
     // What a lane's bound becomes by slabs, of which one at least of the two nodes has any.
     HWY_NOINLINE double slabs_add(double lower, const LaneBounds& bounds, uint32_t lane, uint32_t open, uint32_t other,
@@ -294,13 +290,18 @@ private:
     }
 
     DistanceSearch& s_;
-    PairHeap<std::conditional_t<kSlabs, ByBoundAndCenters, ByBound>> heap_;
+    PairHeap<std::conditional_t<kFlat, ByBoundAndCenters, ByBound>> heap_;
     DistanceSide sides_[2];
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
-    double base_ = 0; // bound of the roots, metres
-    uint32_t room_;   // of the heap: what depth_first() needs is kept free
+    // Not where a level ends the search: bounds of a pair must not depend on when it comes up, or a deeper search might
+    // find less.
+    const bool have_slabs_ =
+        (s_.a.has_slabs || s_.b.has_slabs) && s_.a.limit_from == UINT32_MAX && s_.b.limit_from == UINT32_MAX;
+    const double by_slabs_; // a bound of the roots
+    double base_ = 0;       // bound of the roots, metres
+    uint32_t room_;         // of the heap: what depth_first() needs is kept free
     // Kept bounds are less by this: of slabs by their rounding, so that equal ones are equal.
-    const float kept_less_ = kSlabs ? static_cast<float>(0x1p-43 * s_.reach_of_triangles()) : 0x1p-120f;
+    const float kept_less_ = kFlat ? static_cast<float>(0x1p-43 * s_.reach_of_triangles()) : 0x1p-120f;
     uint32_t count_ = 0;   // of children_
     uint32_t nearest_ = 0; // of them, while they are tested, and its own bound
     double least_ = 0;
@@ -308,11 +309,23 @@ private:
     Entry children_[kMaxDegree];
 };
 
+// A bound on the distance of the roots if both have slabs, which are parallel; else 0.
+double roots_by_slabs(const DistanceSearch& search) {
+    const auto root = [](const TreeSide& side) {
+        const bool inner = side.has_slabs && !side.tree.is_leaf(0);
+        return NodeWithHull{side.tree, 0, inner ? hull_of(side.hulls, side.block(0), 0) : nullptr};
+    };
+    const NodeWithHull a = root(search.a), b = root(search.b);
+    if (a.hull == nullptr || b.hull == nullptr || !may_tell(a, b, search.b_to_a, glm::dvec3(0))) return 0;
+    return search.slabs_apart(a, b);
+}
+
 void traverse_target(DistanceSearch& search) {
-    if (search.a.has_slabs || search.b.has_slabs)
-        DistanceTraversal<true>(search).run();
+    const double by_slabs = roots_by_slabs(search);
+    if (by_slabs > 0)
+        DistanceTraversal<true>(search, by_slabs).run();
     else
-        DistanceTraversal<false>(search).run();
+        DistanceTraversal<false>(search, 0).run();
 }
 
 } // namespace

@@ -16,6 +16,7 @@ namespace {
 using glm::dvec3;
 
 constexpr double kAboutTheSame = 0.95; // cosine
+constexpr double kNothing = 0x1p-50;   // of a direction of length 1: what it costs is within kSeparationMargin S
 
 dvec3 vector(const double (&v)[3]) {
     return {v[0], v[1], v[2]};
@@ -24,14 +25,11 @@ dvec3 vector(const double (&v)[3]) {
 // A node in its tree's frame, ready to say how far it reaches.
 struct Reaching {
     const NodeWithHull& at;
-    const PlacedEllipsoid ellipsoid;
-    bool flat;                // it has a slab:
-    dvec3 normal{0}, point;   // the point is of the plane, or else the center
+    const bool flat; // it has a slab:
+    dvec3 normal{0}, point{0};
     double low = 0, high = 0; // along the normal
 
-    explicit Reaching(const NodeWithHull& node)
-        : at(node), ellipsoid(place(node.tree.bound(node.node))), flat(node.hull != nullptr && has_slab(node.hull)),
-          point(ellipsoid.center) {
+    explicit Reaching(const NodeWithHull& node) : at(node), flat(node.hull != nullptr && has_slab(node.hull)) {
         if (!flat) return;
         const Slab slab = slab_of(node.tree, node.hull);
         normal = vector(slab.normal), point = vector(slab.origin);
@@ -39,13 +37,20 @@ struct Reaching {
         low = plane + slab.low, high = plane + slab.high;
     }
     double along(const dvec3& d) const {
-        if (flat) {
-            const double part = glm::dot(d, normal);
-            return part * (part > 0 ? high : low) + support(ellipsoid, d - part * normal);
+        if (!flat) {
+            const bool is_leaf = at.hull == nullptr && at.tree.has_triangles();
+            return is_leaf ? triangle_support(at.tree, at.tree.triangles(at.node), d) : support(bound(), d);
         }
-        const bool is_leaf = at.hull == nullptr && at.tree.has_triangles();
-        return is_leaf ? triangle_support(at.tree, at.tree.triangles(at.node), d) : support(ellipsoid, d);
+        const double part = glm::dot(d, normal);
+        const dvec3 rest = d - part * normal;
+        const double in_slab = part * (part > 0 ? high : low);
+        // Mere rounding, of lengths within S, is not looked into.
+        return glm::dot(rest, rest) < kNothing * kNothing ? in_slab : in_slab + support(bound(), rest);
     }
+    dvec3 about_center() const { return flat ? point : bound().center; }
+
+private:
+    PlacedEllipsoid bound() const { return place(at.tree.bound(at.node)); }
 };
 
 // The normal of a node's slab to a 127th; 0 without one.
@@ -66,14 +71,14 @@ bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& 
 double gap_of_slabs(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double reach) noexcept {
     const Reaching in_a(a), in_b(b);
     // Of flat nodes that are near each other, the centers are where rounding has put them.
-    const dvec3 between = b_to_a.rotation * in_b.point + b_to_a.translation - in_a.point;
+    const dvec3 between = b_to_a.rotation * in_b.about_center() + b_to_a.translation - in_a.about_center();
     const auto gap_along = [&](const dvec3& normal) {
         const dvec3 n = glm::dot(normal, between) < 0 ? -normal : normal;
         return (glm::dot(n, b_to_a.translation) - in_b.along(-(n * b_to_a.rotation))) - in_a.along(n);
     };
     double gap = -HUGE_VAL;
     if (in_a.flat) gap = std::max(gap, gap_along(in_a.normal));
-    if (in_b.flat) gap = std::max(gap, gap_along(b_to_a.rotation * in_b.normal));
+    if (in_b.flat && !(gap > 0)) gap = std::max(gap, gap_along(b_to_a.rotation * in_b.normal));
     return (gap - kSeparationMargin * reach) * (1 - 0x1p-49);
 }
 

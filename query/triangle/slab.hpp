@@ -21,6 +21,9 @@
 
 namespace prolate::query {
 
+/// Block tests that most queries do not need: slabs cost more than they save before.
+inline constexpr uint64_t kPatience = 32;
+
 /// A node of either tree.
 struct NodeWithHull {
     const TreeView& tree;

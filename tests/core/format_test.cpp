@@ -477,10 +477,10 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
-    for (const char* name : {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree",
-                             "golden_v3_exact.etree", "golden_v4.etree", "golden_v4_exact.etree", "golden_v5.etree",
-                             "golden_v5_exact.etree", "golden_v6.etree", "golden_v6_exact.etree",
-                             "golden_v7.etree", "golden_v7_exact.etree"}) {
+    for (const char* name :
+         {"golden_v1.etree", "golden_v2.etree", "golden_v2_exact.etree", "golden_v3.etree", "golden_v3_exact.etree",
+          "golden_v4.etree", "golden_v4_exact.etree", "golden_v5.etree", "golden_v5_exact.etree", "golden_v6.etree",
+          "golden_v6_exact.etree", "golden_v7.etree", "golden_v7_exact.etree"}) {
         const Bytes file = read(fs::path(PROLATE_TEST_DATA) / name);
         ASSERT_FALSE(file.empty());
         for (const OpenOptions& options : {OpenOptions{}, kNoHash}) {

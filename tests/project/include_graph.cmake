@@ -7,7 +7,7 @@ cmake_minimum_required(VERSION 3.25)
 
 set(most_levels 9)
 set(most_folder_levels 7)
-set(most_edges 175)
+set(most_edges 200)
 
 set(units "")
 file(GLOB_RECURSE files RELATIVE "${ROOT}/query" "${ROOT}/query/*.hpp" "${ROOT}/query/*.cpp")
