@@ -27,9 +27,9 @@ foreach(layer core query)
   list(TRANSFORM names PREPEND ${folder}/)
   list(APPEND sources ${names})
 endforeach()
-# What no page calls: worlds, batches, rays, shapes, sweeps, writing.
-set(not_called "query/(raycast|shapes|sweep|world)/[a-z_]+" "query/ellipsoid/(collide_pairs|distance_pairs|pairs)"
-  "src/(file|format|matrix)")
+# What no page calls: worlds, batches, points, rays, shapes, sweeps, writing.
+set(not_called "query/(half_space|points|raycast|shapes|sweep|world)/[a-z_]+"
+  "query/ellipsoid/(collide_pairs|distance_pairs|pairs)" "src/(file|format|mass|matrix|primitives)")
 list(JOIN not_called "|" not_called)
 list(FILTER sources EXCLUDE REGEX "/(${not_called})\\.cpp$")
 

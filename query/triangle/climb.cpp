@@ -80,7 +80,7 @@ template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) 
             tests_ += triangles;
             for (uint32_t t = begin; t < begin + triangles; ++t) {
                 const Triangle corners = tree_.triangle(t);
-                if (std::ranges::find(corners, vertex) != corners.end()) visit(corners);
+                if (std::find(corners.begin(), corners.end(), vertex) != corners.end()) visit(corners);
             }
         }
     }
@@ -104,7 +104,7 @@ uint32_t Hills::step(uint32_t first, uint32_t second, const dvec3& up) const noe
     uint32_t top = first;
     double most = std::max(height(first, up), height(second, up));
     triangles_at(first, [&](const Triangle& corners) {
-        if (std::ranges::find(corners, second) == corners.end()) return;
+        if (std::find(corners.begin(), corners.end(), second) == corners.end()) return;
         for (const uint32_t v : corners)
             if (v != first && v != second && height(v, up) > most) top = v, most = height(v, up);
     });
