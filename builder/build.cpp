@@ -55,7 +55,6 @@ private:
         source_hash_ = hash(mesh_);
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
         if (auto possible = check_lengths(); !possible) return possible.error();
-        closed_ = report_.closed;
         return options_.exact ? bake_exact() : bake_ellipsoids();
     }
 
@@ -65,7 +64,6 @@ private:
         if (options_.fill > 0) {
             filled_ = fill(mesh_, double{options_.fill});
             mesh_ = filled_.view();
-            closed_ = true;
         }
         if (options_.keep_holes > 0) {
             passages_.emplace(mesh_, double{options_.keep_holes});
@@ -210,7 +208,7 @@ private:
         const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
         return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
     }
-    bool closed() const { return closed_; }
+    bool closed() const { return report_.closed || options_.fill > 0; } // what is filled is closed
     // The leaves' largest distance from the solid that is asked for, metres; HUGE_VAL: none is.
     double most_distance() const {
         const double share = 0.01 * double{options_.distance} * box_.size().norm();
@@ -397,7 +395,6 @@ private:
     Mesh filled_;   // if that is asked for
     MeshView mesh_; // what bounds the solid: either of these
     MeshReport report_;
-    bool closed_ = false;
     std::optional<Passages> passages_;
     double hole_radius_ = 0;
     Box box_;

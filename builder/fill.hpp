@@ -17,8 +17,8 @@ namespace prolate {
 double fill_pitch(const Box& box, double radius);
 
 /// The surface of the filled solid: closed, oriented outwards, each side of a row of cells as few rectangles, so that
-/// corners of some lie on edges of others. `radius` in metres, least_fill() ... most_fill() of the mesh's box
-/// (build.hpp). The same for any number of threads. Throws Cancelled.
+/// corners of some lie on edges of others. `radius` in metres, in the ball_range() of the mesh's box (build.hpp).
+/// The same for any number of threads. Throws Cancelled.
 Mesh fill(MeshView mesh, double radius);
 
 } // namespace prolate

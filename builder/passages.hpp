@@ -1,6 +1,6 @@
 // Holes that a cover must leave free: a ball of a given radius that passes through the mesh's passes the cover's, too.
 //
-// Where a ball that is a seventh larger fits around the mesh, its center has places on a lattice (free_space.hpp).
+// Where a ball that is somewhat larger fits around the mesh, its center has places on a lattice (free_space.hpp).
 // These are thinned to a skeleton: places are taken away, nearest to the surface first, as long as this changes neither
 // holes nor parts nor cavities of what is left (simple points; Bertrand and Malandain 1994), but never those on the
 // lattice's border. What remains is the border, a curve through each hole, in its middle, and a sheet between parts
@@ -20,11 +20,11 @@ namespace prolate {
 
 class Passages {
 public:
-    /// Of the mesh, for a ball of `radius` metres, least_hole() ... most_fill() of its box (build.hpp). The same for
-    /// any number of threads. Throws Cancelled.
+    /// Of the mesh, for a ball of `radius` metres, in the ball_range() of its box (build.hpp). The same for any number
+    /// of threads. Throws Cancelled.
     Passages(MeshView mesh, double radius);
 
-    /// Places of the ball's center, neighbours at most `step` apart.
+    /// Places of the ball's center, a step of the lattice apart.
     std::span<const Vec> skeleton() const { return skeleton_; }
     /// Is there a hole at all, or a gap between parts, that the ball passes?
     bool any() const { return any_; }

@@ -18,14 +18,16 @@ namespace {
 
 constexpr const char* kFooter = R"(
 The goal is --levels, --ellipsoids, a closeness (--tolerance, --distance, --clearance, --keep-holes or several) or
---exact. Give at most one; the default is 3 levels. For a closeness, the tree gets as few leaves as reach it, more where the shape needs
+--exact. The default is 3 levels. For a closeness, the tree gets as few leaves as reach it, more where the shape needs
 more: the cover then sticks out of the solid by no more than that volume and that distance. --ellipsoids with a
-closeness is "at most": as few as reach it, and no tree at all if that many do not. The line then says what they reach.
+closeness is "at most": as few as reach it, and no tree at all if that many do not, but a line that says what they
+reach. --levels and --exact go with no other goal.
 
 With --fill, what a ball of that radius cannot reach from outside is inside, for hollow shells of robots, bodies of cars
 and houses: an open mesh has an inside then, too. The filled solid is made of cells, 1/160 of the longest side or more.
-It holds the mesh and all that cannot be reached, and sticks out by a cell or two. All figures are about it. --keep-holes is
-the opposite: as few leaves as leave each hole free for such a ball, wherever one that is larger by a seventh passes.
+It holds the mesh and all that cannot be reached, and sticks out by a cell or two. All figures are about it.
+--keep-holes is the opposite: as few leaves as leave each hole free for such a ball, wherever a somewhat larger one
+passes: by a seventh of its radius, or by 1/110 of the longest side if that is more.
 
 With --exact, the tree goes down to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover
 the surface only, and queries answer for the triangles. 100,000 triangles take about a second, whatever the quality.
@@ -53,9 +55,9 @@ A manifest bakes many assets in one run. It is a JSON file:
   }
 An entry has a mesh, an output, and any of the options above by their long names without dashes. Values are numbers
 or strings, and true for an option without a value. Missing options are taken from the defaults; but an entry with
-one of levels, ellipsoids, tolerance, distance, clearance, keep-holes and exact takes none of these from them. Paths are relative
-to the manifest's folder. A bad entry, or an asset that fails, is reported in one line and does not stop the others; the
-exit code is then 1. Ctrl-C keeps what is done.
+one of levels, ellipsoids, tolerance, distance, clearance, keep-holes and exact takes none of these from them. Paths
+are relative to the manifest's folder. A bad entry, or an asset that fails, is reported in one line and does not stop
+the others; the exit code is then 1. Ctrl-C keeps what is done.
 )";
 
 constexpr const char* kExamples = R"(

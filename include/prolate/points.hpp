@@ -26,8 +26,8 @@ struct SignedDistance {
     Verdict verdict = Verdict::undecided;
     /// Certified: lower <= signed distance <= upper, metres. Of an exact tree they are equal except for rounding, which
     /// near the surface is up to 4e-9 of the lengths involved, and so are those of points outside a tree without
-    /// triangles. Inside overlapping ellipsoids there is room between
-    /// them: the true distance is at least that of the deepest single ellipsoid, and at most that of `point`.
+    /// triangles. Inside overlapping ellipsoids there is room between them: the point is at least as deep as in the
+    /// deepest single ellipsoid, and at most as deep as `point` is far.
     double lower = -std::numeric_limits<double>::infinity(), upper = std::numeric_limits<double>::infinity();
     /// The nearest point of the surface that was found, world. Of several that are equally near, the one on the
     /// triangle, or in the node, of the least index. Means nothing, as the three fields below, if none was reached.

@@ -5,15 +5,15 @@
  *  - Functions return a prolate_status, and PROLATE_OK is 0. A failed call writes nothing but *error.
  *  - Structs that may grow begin with their size and a version. Make them with PROLATE_INIT(type), or set `size` to
  *    sizeof and `version` to PROLATE_API_VERSION. A library reads and writes no more than the size that it is told, so
- * a program runs with later libraries of the same version. Anything else is PROLATE_BAD_STRUCT.
+ *    that a program runs with later libraries of the same version. Anything else is PROLATE_BAD_STRUCT.
  *  - Options may be NULL for the defaults, and so may caches and errors. All other pointers must not be NULL:
  *    PROLATE_BAD_ARGUMENT.
  *  - Queries allocate nothing: they work in `scratch`, memory of the caller's, at least prolate_scratch_size() bytes,
  *    aligned to 64, for one query at a time. It needs no initialisation. Only the functions that make primitives and
  *    worlds allocate, the latter by the caller's functions.
  *  - Trees may be shared between threads. Nothing has hidden state.
- *  - Lengths in metres or any unit used consistently; a pose rotates first, then translates; quaternions are x, y, z,
- * w.
+ *  - Lengths in metres or any unit used consistently; a pose rotates first, then translates; quaternions are
+ *    x, y, z, w.
  *  - What is not finite is no error of a query, but never *separated* (query.hpp).
  */
 #ifndef PROLATE_PROLATE_H

@@ -28,8 +28,9 @@ struct VerifyReport {
     /// overlook some of it, and `unbounded_node` is the first node whose bounding volume fails.
     bool bounded = true;
     uint32_t unbounded_node = 0;
-    /// Of a whole tree that was baked with `keep_holes`: a ball of that radius passes the leaves wherever one that is
-    /// larger by a seventh passes the mesh. If not, the ball whose center is `blocked` is not certainly free.
+    /// Of a whole tree that was baked with `keep_holes`: a ball of that radius passes the leaves wherever a somewhat
+    /// larger one passes the mesh (BuildOptions::keep_holes says by how much). If not, the ball whose center is
+    /// `blocked` is not certainly free.
     bool holes_kept = true;
     double blocked[3] = {};
     bool surface_mode = false;      ///< the mesh is open: the proof is about its triangles, there is no inside
@@ -57,8 +58,8 @@ struct VerifyOptions {
 ///
 /// Of an exact tree, the triangles are compared with the mesh's, and each must lie in all ellipsoids above it. A prefix
 /// of one is proved to cover the triangles, as in surface mode. Queries descend by its nodes, so there each part must
-/// lie in a node and in all nodes above it. Thread-safe. Fails with bad_mesh (also if the ball of
-/// the tree's fill or keep_holes does not suit this mesh, see ball_range()) or cancelled.
+/// lie in a node and in all nodes above it. Thread-safe. Fails with bad_mesh (also if the ball of the tree's fill or
+/// keep_holes does not suit this mesh, see ball_range()) or cancelled.
 Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOptions& options = {});
 
 } // namespace prolate
