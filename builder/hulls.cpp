@@ -81,9 +81,20 @@ std::vector<Vec> choose(const std::vector<Vec>& w) {
     return out;
 }
 
+// Twice the area of a triangle.
+double twice_area(const TreeView& tree, uint32_t triangle) {
+    const Triangle t = tree.triangle(triangle);
+    const Vec p = to_vec(tree.vertex(t[0]));
+    return (to_vec(tree.vertex(t[1])) - p).cross(to_vec(tree.vertex(t[2])) - p).norm();
+}
+
 // What lies below a node: triangles, and their corners, each once.
+struct Face {
+    uint32_t triangle;
+    double area; // twice
+};
 struct Below {
-    std::vector<uint32_t> triangles;
+    std::vector<Face> faces;
     std::vector<Vec> corners;
 };
 Below below(const TreeView& tree, uint32_t node) {
@@ -92,7 +103,7 @@ Below below(const TreeView& tree, uint32_t node) {
     const auto collect = [&](const auto& self, uint32_t at) -> void {
         const TriangleRange range = tree.triangles(at);
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
-            out.triangles.push_back(t);
+            out.faces.push_back({t, twice_area(tree, t)});
             for (const uint32_t v : tree.triangle(t)) vertices.push_back(v);
         }
         const ChildRange children = tree.children(at);
@@ -104,13 +115,6 @@ Below below(const TreeView& tree, uint32_t node) {
     out.corners.reserve(vertices.size());
     for (const uint32_t v : vertices) out.corners.push_back(to_vec(tree.vertex(v)));
     return out;
-}
-
-// Twice the area of a triangle, squared.
-double area_squared(const TreeView& tree, uint32_t triangle) {
-    const Triangle t = tree.triangle(triangle);
-    const Vec p = to_vec(tree.vertex(t[0]));
-    return (to_vec(tree.vertex(t[1])) - p).cross(to_vec(tree.vertex(t[2])) - p).squaredNorm();
 }
 
 // Between which heights over a plane all corners lie, rounded outwards; wider than `enough`, perhaps too little, once
@@ -132,15 +136,15 @@ Heights heights_over(const Slab& plane, std::span<const Vec> corners, double eno
 }
 
 // The area of the triangles in a plane; 0 if they are fewer than kFewest.
-double area_in(const TreeView& tree, const Slab& plane, std::span<const uint32_t> triangles, double touching) {
+double area_in(const TreeView& tree, const Slab& plane, std::span<const Face> faces, double touching) {
     double area = 0;
     size_t count = 0;
-    for (const uint32_t t : triangles) {
+    for (const auto& [t, of_t] : faces) {
         const Triangle corners = tree.triangle(t);
         const bool in_plane = std::all_of(corners.begin(), corners.end(), [&](uint32_t v) {
             return std::abs(plane.height(to_vec(tree.vertex(v)).data())) <= touching;
         });
-        if (in_plane) area += std::sqrt(area_squared(tree, t)), ++count;
+        if (in_plane) area += of_t, ++count;
     }
     return count < kFewest ? 0 : area;
 }
@@ -156,30 +160,28 @@ void store_slab(std::byte* record, const Slab& plane, uint32_t triangle, const H
 // Of the planes of the largest triangles that with the thinnest slab, if that is thin for a node of this size; else the
 // plane of a face, with all of the node on one side of it, that has the most area.
 void describe_slab(const TreeView& tree, Below& below, double size, std::byte* record) {
-    std::vector<uint32_t>& triangles = below.triangles;
-    const size_t count = std::min(triangles.size(), kPlanes);
-    std::partial_sort(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(count), triangles.end(),
-                      [&](uint32_t s, uint32_t t) {
-                          const double of_s = area_squared(tree, s), of_t = area_squared(tree, t);
-                          return of_s > of_t || (of_s == of_t && s < t);
-                      });
+    std::vector<Face>& faces = below.faces;
+    const size_t count = std::min(faces.size(), kPlanes);
     double whole = 0;
-    for (const uint32_t t : triangles) whole += std::sqrt(area_squared(tree, t));
+    for (const Face& face : faces) whole += face.area;
+    std::partial_sort(
+        faces.begin(), faces.begin() + static_cast<std::ptrdiff_t>(count), faces.end(),
+        [](const Face& s, const Face& t) { return s.area > t.area || (s.area == t.area && s.triangle < t.triangle); });
     const double touching = kTouching * size;
     double thinnest = kThinSlab * size, largest = kShareOfFace * whole;
     bool thin = false;
-    for (const uint32_t t : std::span(triangles).first(count)) {
-        const Slab plane = plane_of(tree, t);
+    for (const Face& face : std::span(faces).first(count)) {
+        const Slab plane = plane_of(tree, face.triangle);
         if (!Vec(plane.normal).allFinite()) continue;
         const Heights heights = heights_over(plane, below.corners, thinnest, touching);
         if (heights.width() <= thinnest) {
             thin = true, thinnest = heights.width();
-            store_slab(record, plane, t, heights);
+            store_slab(record, plane, face.triangle, heights);
         } else if (!thin && (heights.low >= -touching || heights.high <= touching)) {
-            const double area = area_in(tree, plane, triangles, touching);
+            const double area = area_in(tree, plane, faces, touching);
             if (!(area > largest)) continue;
             largest = area;
-            store_slab(record, plane, t, heights);
+            store_slab(record, plane, face.triangle, heights);
         }
     }
 }

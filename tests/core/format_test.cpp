@@ -225,7 +225,7 @@ void expect_sound(const TreeView& tree) {
                 info.quality <= Quality::best);
 }
 
-TEST(Format, GoldenExactFileOfVersionSix) {
+TEST(Format, GoldenExactFile) {
     const Bytes file = golden_file("golden_v8_exact.etree", golden_exact());
     ASSERT_EQ(file.size(), kGoldenHash + 8 + 7 * 12 + 5 * 6);
     EXPECT_EQ(golden_exact(), file);
@@ -273,7 +273,7 @@ TEST(Format, IndicesTakeFourBytesFromVertex65536On) {
     }
 }
 
-TEST(Format, GoldenFileOfVersionSix) {
+TEST(Format, GoldenFile) {
     const Bytes file = golden_file("golden_v8.etree", golden());
     ASSERT_EQ(file.size(), kEnd);
     EXPECT_EQ(golden(), file);
@@ -474,6 +474,15 @@ TEST(Format, MoreThanEightSiblingsTakeSeveralBlocks) {
     std::vector<uint32_t> last;
     tree->for_each_node(2, [&](uint32_t n) { last.push_back(n); });
     EXPECT_EQ(last, (std::vector<uint32_t>{16, 17, 18, 19, 20, 21, 22, 23, 24, 32, 33, 34, 35, 36, 37, 38, 39}));
+}
+
+TEST(Format, TheDescriptionIsOfThisVersion) {
+    const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "../../src/FORMAT.md");
+    const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
+    const std::string version = std::to_string(kFormatVersion);
+    for (const std::string& words : {"format, version " + version, "| version | " + version + " |",
+                                     "golden_v" + version + ".etree", "| " + version + " | 0.1.0 |"})
+        EXPECT_NE(text.find(words), std::string::npos) << words;
 }
 
 TEST(Format, OlderVersionsAreRefusedInWords) {
