@@ -21,13 +21,11 @@ Matrix4 to_matrix(const Pose& pose) noexcept {
              {0, 0, 0, 1}}};
 }
 
-namespace {
-
 // S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978: from the largest of
 // the four components, so that no digits cancel.
-Quat rotation_of(const double (&m)[4][4]) {
+std::array<double, 4> quaternion_of(const double (&m)[3][3]) noexcept {
     const double trace = m[0][0] + m[1][1] + m[2][2];
-    double q[4]; // x, y, z, w
+    std::array<double, 4> q; // x, y, z, w
     if (trace >= std::max({m[0][0], m[1][1], m[2][2]})) {
         q[3] = 1 + trace;
         for (size_t i = 0; i < 3; ++i) {
@@ -44,10 +42,8 @@ Quat rotation_of(const double (&m)[4][4]) {
     }
     const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     for (double& c : q) c /= length;
-    return {static_cast<float>(q[0]), static_cast<float>(q[1]), static_cast<float>(q[2]), static_cast<float>(q[3])};
+    return q;
 }
-
-} // namespace
 
 Result<Pose> pose_from_matrix(const Matrix4& matrix) noexcept {
     const auto bad = [](const char* what) { return Error{ErrorCode::bad_options, what}; };
@@ -76,7 +72,10 @@ Result<Pose> pose_from_matrix(const Matrix4& matrix) noexcept {
         *translation[i] = static_cast<float>(m[i][3]);
         if (!std::isfinite(*translation[i])) return bad("the translation is beyond the range of floats");
     }
-    pose.rotation = rotation_of(m);
+    const double rotation[3][3] = {
+        {m[0][0], m[0][1], m[0][2]}, {m[1][0], m[1][1], m[1][2]}, {m[2][0], m[2][1], m[2][2]}};
+    const auto [x, y, z, w] = quaternion_of(rotation);
+    pose.rotation = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(z), static_cast<float>(w)};
     return pose;
 }
 

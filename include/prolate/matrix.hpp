@@ -5,6 +5,8 @@
 #include <prolate/error.hpp>
 #include <prolate/types.hpp>
 
+#include <array>
+
 namespace prolate {
 
 /// A rigid transform of column vectors: world = m * (x, y, z, 1). m[row][column]; the upper left 3x3 is a rotation, the
@@ -19,6 +21,9 @@ inline constexpr double kRigidTolerance = 1e-4;
 /// The matrix of `pose`, whose quaternion is normalised first. All entries are NaN if the pose is not finite or its
 /// quaternion is zero. Thread-safe.
 Matrix4 to_matrix(const Pose& pose) noexcept;
+
+/// The unit quaternion x, y, z, w of a rotation matrix, m[row][column], to double precision. Thread-safe.
+std::array<double, 4> quaternion_of(const double (&m)[3][3]) noexcept;
 
 /// The pose of a rigid matrix, rounded to floats, with a unit quaternion. Points at distance d from the body's origin
 /// are then off by at most about kRigidTolerance * d, and no more than rounding if the matrix is rigid.

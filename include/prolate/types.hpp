@@ -64,6 +64,9 @@ struct PrincipalAxes {
 /// Principal axes of `e`, by the library's own Jacobi iteration: the same bits on every IEEE platform.
 /// Thread-safe; never fails for an ellipsoid read from an opened tree.
 PrincipalAxes principal_axes(const Ellipsoid& e) noexcept;
+/// The same with radii enlarged, by little more than rounding, so that what a reader of the center and of these makes
+/// of them in double precision holds the ellipsoid.
+PrincipalAxes outer_axes(const Ellipsoid& e) noexcept;
 
 /// Volume of `e`, cubic metres.
 double volume(const Ellipsoid& e) noexcept;

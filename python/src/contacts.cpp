@@ -16,17 +16,14 @@ nb::tuple contacts_of(nb::handle a, nb::handle poses_a_, nb::handle b, nb::handl
     const HeldTree &tree_a = tree_of(a, "a"), &tree_b = tree_of(b, "b");
     const Poses poses_a(poses_a_, "poses_a", wxyz), poses_b(poses_b_, "poses_b", wxyz);
     const size_t count = broadcast(poses_a, "poses_a", poses_b, "poses_b");
-    const double wide = number_from_0(margin, "margin");
-    const auto level = static_cast<uint32_t>(whole_or(max_level, "max_level", 0, UINT32_MAX, kMaxLevels));
-    const uint64_t tests = whole_or(budget, "budget", 0, UINT64_MAX, UINT64_MAX);
+    const Limits limits(margin, max_level, budget);
     std::vector<std::vector<Contact>> found(count);
     auto verdict = new_array<uint8_t>(count);
     for_all(count, thread_count(threads), [&](size_t i, QueryContext& context) {
         const PlacedBodies at = place(poses_a, tree_a.reach, poses_b, tree_b.reach, i);
         ContactManifolds manifolds;
         const ContactResult r =
-            contacts(tree_a.view, at.a, tree_b.view, at.b, manifolds, context,
-                     {.max_level = level, .max_pair_tests = tests, .margin = rounded_up(wide + at.slack)});
+            contacts(tree_a.view, at.a, tree_b.view, at.b, manifolds, context, limits.options(at.slack));
         verdict[i] = static_cast<uint8_t>(r.verdict);
         collect(manifolds, at, found[i]);
     });

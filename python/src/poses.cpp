@@ -41,24 +41,11 @@ std::string at_index(const char* name, bool single, size_t i) {
     return single ? std::string(name) : std::string(name) + "[" + std::to_string(i) + "]";
 }
 
-// S. W. Shepperd, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3), 1978.
 DoublePose pose_of(const double (&m)[4][4]) noexcept {
-    DoublePose out;
-    for (size_t i = 0; i < 3; ++i) out.t[i] = m[i][3];
-    const double trace = m[0][0] + m[1][1] + m[2][2];
-    double(&q)[4] = out.q;
-    if (trace >= std::max({m[0][0], m[1][1], m[2][2]})) {
-        q[3] = 1 + trace;
-        for (size_t i = 0; i < 3; ++i) q[i] = m[(i + 2) % 3][(i + 1) % 3] - m[(i + 1) % 3][(i + 2) % 3];
-    } else {
-        const size_t i = m[0][0] >= m[1][1] ? (m[0][0] >= m[2][2] ? 0 : 2) : (m[1][1] >= m[2][2] ? 1 : 2);
-        const size_t j = (i + 1) % 3, k = (i + 2) % 3;
-        q[i] = 1 + m[i][i] - m[j][j] - m[k][k];
-        q[j] = m[i][j] + m[j][i];
-        q[k] = m[i][k] + m[k][i];
-        q[3] = m[k][j] - m[j][k];
-    }
-    return out;
+    const double rotation[3][3] = {
+        {m[0][0], m[0][1], m[0][2]}, {m[1][0], m[1][1], m[1][2]}, {m[2][0], m[2][1], m[2][2]}};
+    const auto [x, y, z, w] = quaternion_of(rotation);
+    return {{m[0][3], m[1][3], m[2][3]}, {x, y, z, w}};
 }
 
 // Doubles of any layout to `own`, the quaternion's real part last.

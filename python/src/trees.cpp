@@ -1,6 +1,8 @@
 // Trees: opening bytes, and what they hold, as arrays.
 #include "python/src/tree.hpp"
 
+#include <prolate/matrix.hpp>
+
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -45,47 +47,6 @@ uint32_t level_of(const TreeView& tree, nb::handle level) {
     return static_cast<uint32_t>(l);
 }
 
-// Radii enlarged so that center, radii and rotation, read in double precision, hold the decoded ellipsoid:
-// G = diag(1/r) R^T L maps the unit ball into the unit ball of what is read, and |G|^2 <= 1 + |G^T G - 1|.
-PrincipalAxes outer_axes(const Ellipsoid& e) {
-    PrincipalAxes axes = principal_axes(e);
-    const double l[3][3] = {{e.l11, 0, 0}, {e.l21, e.l22, 0}, {e.l31, e.l32, e.l33}};
-    double g[3][3] = {}, square = 0;
-    for (size_t i = 0; i < 3; ++i)
-        for (size_t j = 0; j < 3; ++j)
-            for (size_t k = 0; k < 3; ++k) g[i][j] += axes.rotation[k][i] * l[k][j] / axes.radii[i];
-    for (size_t i = 0; i < 3; ++i)
-        for (size_t j = 0; j < 3; ++j) {
-            const double entry = g[0][i] * g[0][j] + g[1][i] * g[1][j] + g[2][i] * g[2][j] - (i == j ? 1 : 0);
-            square += entry * entry;
-        }
-    const double growth = 1 + std::sqrt(square) + 0x1p-46 * axes.radii[0] / axes.radii[2];
-    for (double& radius : axes.radii) radius *= growth;
-    return axes;
-}
-
-// From the largest component, as matrix.hpp does.
-std::array<double, 4> quaternion(const double (&m)[3][3]) {
-    std::array<double, 4> q{};
-    const double trace = m[0][0] + m[1][1] + m[2][2];
-    size_t largest = 3;
-    for (size_t i = 0; i < 3; ++i)
-        if (m[i][i] > (largest == 3 ? trace : m[largest][largest])) largest = i;
-    if (largest == 3) {
-        q[3] = 1 + trace;
-        for (size_t i = 0; i < 3; ++i) q[i] = m[(i + 2) % 3][(i + 1) % 3] - m[(i + 1) % 3][(i + 2) % 3];
-    } else {
-        const size_t i = largest, j = (i + 1) % 3, k = (i + 2) % 3;
-        q[i] = 1 + m[i][i] - m[j][j] - m[k][k];
-        q[j] = m[i][j] + m[j][i];
-        q[k] = m[i][k] + m[k][i];
-        q[3] = m[k][j] - m[j][k];
-    }
-    const double length = norm({q[0], q[1], q[2], q[3]});
-    for (double& c : q) c /= length;
-    return q;
-}
-
 std::vector<int64_t> parents(const TreeView& tree) {
     std::vector<int64_t> out(tree.slot_count(), -1);
     tree.for_each_node([&](uint32_t node) {
@@ -114,7 +75,7 @@ nb::tuple cut(const HeldTree& held, nb::handle level) {
         std::copy(std::begin(l), std::end(l), &factor[9 * i]);
         std::copy(std::begin(axes.radii), std::end(axes.radii), &radii[3 * i]);
         std::copy(&axes.rotation[0][0], &axes.rotation[0][0] + 9, &rotation[9 * i]);
-        const auto q = quaternion(axes.rotation);
+        const auto q = quaternion_of(axes.rotation);
         std::copy(q.begin(), q.end(), &quaternions[4 * i]);
         node[i] = nodes[i];
         parent[i] = parent_of[nodes[i]];

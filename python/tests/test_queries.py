@@ -361,7 +361,7 @@ def test_world(box_a, box_b):
         assert caught.value.code == "bad_id"
     hidden = world.insert(box_b, IDENTITY, layers=2, mask=2)
     assert len(world.collide().ids) == 0
-    assert "5" in repr(prolate.World()) or "6 bodies" in repr(world)
+    assert "6 bodies" in repr(world)
     world.remove(hidden)
 
 
