@@ -66,7 +66,8 @@ private:
         pair_tests_ = 1;
         if (test_all(kOpenB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
         while (size_ > 0) {
-            const auto e = stack_[--size_];
+            auto e = stack_[--size_];
+            if (s_.sift != nullptr && s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
             const uint32_t open = e.flags & kOpenB;
             const uint32_t node = open != 0 ? e.node_b : e.node_a, other = open != 0 ? e.node_a : e.node_b;
             const Side& side = sides_[open];
@@ -149,7 +150,8 @@ private:
     // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
     HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t of_parent) {
-        const uint32_t other_is_leaf = of_parent & kOtherIsLeaf, in_one_plane = of_parent & kInOnePlane;
+        const uint32_t other_is_leaf = of_parent & kOtherIsLeaf, in_one_plane = of_parent & kInOnePlane,
+                       inherited = of_parent & (kInOnePlane | CollideSearch::kSiftBits);
         Side& side = sides_[open];
         const std::byte* const block = side.block(first);
         ++block_tests_;
@@ -173,13 +175,13 @@ private:
         s_.roots_meet = true;
         const uint32_t leaves = side.leaf_lanes(first, block);
         if (other_is_leaf != 0 && (meet & leaves) != 0) {
-            if (decide(open, first, meet & leaves, other, kept)) return true;
+            if (decide(open, first, meet & leaves, other, kept, inherited)) return true;
             meet &= ~leaves;
         }
         const uint32_t opened = ~leaves & (other_is_leaf != 0 ? 0xff : larger);
-        const uint32_t if_opened = open | other_is_leaf | in_one_plane,
-                       if_other_opened = (open ^ kOpenB) | in_one_plane;
-        uint32_t deepest = size_;
+        const uint32_t if_opened = open | other_is_leaf | inherited, if_other_opened = (open ^ kOpenB) | inherited;
+        const uint32_t before = size_;
+        uint32_t deepest = before;
         float least = HUGE_VALF;
         for (; meet != 0; meet &= meet - 1) {
             const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
@@ -197,11 +199,14 @@ private:
             stack_[size_++] = {open != 0 ? other : node, open != 0 ? node : other, kept.depth[lane], flags};
         }
         if (deepest < size_) std::swap(stack_[deepest], stack_[size_ - 1]);
+        if (s_.sift != nullptr)
+            size_ = static_cast<uint32_t>(s_.sift(s_.sift_user, stack_ + before, stack_ + size_) - stack_);
         return false;
     }
 
     // Decides on these lanes, the deepest first, against the other tree's leaf. True to stop the query.
-    HWY_NOINLINE bool decide(uint32_t open, uint32_t first, uint32_t lanes, uint32_t other, const Kept& kept) {
+    HWY_NOINLINE bool decide(uint32_t open, uint32_t first, uint32_t lanes, uint32_t other, const Kept& kept,
+                             uint32_t flags) {
         s_.stats.pair_tests = pair_tests_;
         while (lanes != 0) {
             auto lane = static_cast<uint32_t>(std::countr_zero(lanes));
@@ -210,6 +215,10 @@ private:
                 if (kept.depth[next] < kept.depth[lane]) lane = next;
             }
             lanes &= ~(1u << lane);
+            if (s_.sift != nullptr) {
+                QueryContext::Entry e{open != 0 ? other : first + lane, open != 0 ? first + lane : other, 0, flags};
+                if (s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
+            }
             const bool look = kept.depth[lane] > kLeavesNearlySeparated;
             const glm::dvec3 to_lane =
                 look ? glm::dvec3(kept.n[0][lane], kept.n[1][lane], kept.n[2][lane]) : glm::dvec3(0); // in its frame

@@ -31,6 +31,13 @@ struct CollideSearch {
     uint64_t found = 0;
     void (*each)(void* user, const MeetingPair& pair) = nullptr; ///< is handed all pairs taken, if not null
     void* each_user = nullptr;
+    /// Of a search that need not see all pairs: sorts pairs of nodes that are put on the stack, up to a block of them,
+    /// so that the last are opened first, and takes out those that need not be opened. Returns the new end. Each pair
+    /// comes again before it is opened, or decided, alone. It may set kSiftBits of an entry's flags: pairs below it
+    /// keep them.
+    QueryContext::Entry* (*sift)(void* user, QueryContext::Entry* begin, QueryContext::Entry* end) = nullptr;
+    void* sift_user = nullptr;
+    static constexpr uint32_t kSiftBits = 0xff00;
     uint64_t other_tests = 0;  ///< that `each` did, of the same budget
     bool out_of_tests = false; ///< the budget ran out within a leaf
 

@@ -8,10 +8,15 @@
 // patches all of which another one resolves are dropped. The second time for the points: of each pair along the normal
 // of the first patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
 //
-// Complexity: twice collide_all()'s, and some microseconds for each pair that meets; for each patch up to 18 climbs and
-// rays.
+// Once there are more pairs than usual, both times leave out pairs of nodes that have the normal of a patch, which
+// resolves them, and reach no farther out than the patch's points (node_pair.hpp); the others are opened in the order
+// of how much farther they do. In the mean of the normals, what is left out weighs about as much.
+//
+// Complexity: twice collide_all()'s without what is left out, and some microseconds for each pair that meets; for each
+// patch up to 18 climbs and rays.
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
+#include "query/contacts/node_pair.hpp"
 #include "query/contacts/pair_contacts.hpp"
 
 #include <prolate/contacts.hpp>
@@ -20,6 +25,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace prolate {
@@ -30,7 +36,10 @@ using glm::dvec3;
 
 constexpr double kSamePoint = 1e-4;   // of the smaller body: what is nearer is one point
 constexpr double kLeastWeight = 1e-7; // of the smaller body: a normal's weight in the mean, if its pair has no depth
-constexpr double kSlack = 0.25;       // of a depth: the normals of curved bodies are means, and no exact ones
+constexpr uint64_t kMany = 64;        // pairs that meet, more than most bodies have
+// Shares of a patch's extent: points that lie farther out by less do not matter, to its normal and to its outline.
+constexpr double kFarther = 0x1p-6, kFartherOut = 0x1p-10;
+constexpr double kSlack = 0.25; // of a depth: the normals of curved bodies are means, and no exact ones
 
 double smaller_size(const CollideSearch& search) {
     return std::min(place(search.a.tree.root()).size, place(search.b.tree.root()).size);
@@ -44,11 +53,17 @@ public:
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
         search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
         search.each_user = this;
+        if (search.a.limit_from != UINT32_MAX || search.b.limit_from != UINT32_MAX) return; // nodes stand for triangles
+        search.sift = [](void* self, QueryContext::Entry* begin, QueryContext::Entry* end) {
+            return static_cast<Collector*>(self)->sift(begin, end);
+        };
+        search.sift_user = this;
     }
 
     // Between the two passes: settles the normals and depths of the manifolds.
     void settle() {
         flush();
+        many_ = search_.found >= kMany;
         Group groups[Patches::kMost];
         const uint32_t count = group_patches(groups);
         bool needed[Patches::kMost];
@@ -89,6 +104,62 @@ private:
         Patch deepest;
     };
 
+    // ---- what need not be looked at ----
+
+    // CollideSearch::sift.
+    QueryContext::Entry* sift(QueryContext::Entry* begin, QueryContext::Entry* end) {
+        if (!(settled_ ? many_ : search_.found >= kMany && !patches_.full())) return end;
+        double gains[kBlockLanes];
+        uint32_t count = 0;
+        for (const QueryContext::Entry* from = begin; from < end; ++from) {
+            QueryContext::Entry e = *from;
+            const double gain = gain_of(e);
+            if (!(gain > 0)) continue;
+            uint32_t at = count++;
+            for (; at > 0 && gains[at - 1] > gain; --at) gains[at] = gains[at - 1], begin[at] = begin[at - 1];
+            gains[at] = gain, begin[at] = e;
+        }
+        return begin + count;
+    }
+    // How much farther out, or deeper, points of a pair of nodes may lie than those that are known of the patch or way
+    // that resolves it. Infinite if there is none, or the pair is not flat; not above 0: it need not be looked at.
+    double gain_of(QueryContext::Entry& e) {
+        const NodePair pair(search_, e.node_a, e.node_b);
+        uint32_t resolving = e.flags / kFirstSiftBit; // 0: not known yet, else one more than its number
+        if (resolving == 0) resolving = resolving_patch(pair);
+        if (resolving == 0) return HUGE_VAL;
+        e.flags |= resolving * kFirstSiftBit;
+        const auto extent = [&](const dvec3& d) { return pair.extent(d); };
+        const auto gain = [&](const Patch& patch, const dvec3& n, double share) {
+            return patch.empty() ? HUGE_VAL : patch.gain(pair.overlap(n), same_point(), share, extent);
+        };
+        if (!settled_) {
+            Patch& patch = patches_[resolving - 1];
+            const dvec3 n = patch.normal();
+            const double out = gain(patch, n, kFarther);
+            if (!(out > 0)) patch.weigh(n, static_cast<double>(pair.triangles()) * weight_of(patch.depth()));
+            return out;
+        }
+        double most = 0; // a pair's points are those of the first way that resolves it
+        for (uint32_t i = 0; i < resolving; ++i) most = std::max(most, gain(points_[i], ways_[i].normal, kFartherOut));
+        const auto holds = [&](const dvec3& p) { return points_[resolving - 1].holds(p, same_point(), extent); };
+        return most > 0 || !last_.any(holds) ? most : same_point(); // what is known is found again
+    }
+    // One more than the number of a patch, or way, along which the nodes only touch, or that resolves all pairs below
+    // them if they are flat, with their normal.
+    uint32_t resolving_patch(const NodePair& pair) {
+        std::optional<dvec3> normal; // if it is asked for
+        for (uint32_t i = 0; i < (settled_ ? way_count_ : patches_.count()); ++i) {
+            const dvec3 n = settled_ ? ways_[i].normal : patches_[i].normal();
+            const double depth = settled_ ? ways_[i].depth : patches_[i].overlap(), overlap = pair.overlap(n);
+            if (!(overlap <= depth + same_point())) continue;
+            if (overlap <= same_point()) return i + 1;
+            if (!normal) normal = pair.normal();
+            if (std::abs(glm::dot(n, *normal)) > kSameAsFace) return i + 1;
+        }
+        return 0;
+    }
+
     void add(const MeetingPair& pair) { settled_ ? add_points(pair) : add_normals(pair); }
 
     // ---- the first pass ----
@@ -111,8 +182,11 @@ private:
         }
     }
     void take(const Contact& c, bool with_normal) {
-        const double weight = with_normal ? std::max(0.0, c.depth + search_.options.margin) + kLeastWeight * size_ : 0;
+        const double weight = with_normal ? weight_of(c.depth) : 0;
         patches_.add(c.normal, candidate(c), weight, with_normal ? c.overlap : -HUGE_VAL);
+    }
+    double weight_of(double depth) const {
+        return std::max(0.0, depth + search_.options.margin) + kLeastWeight * size_;
     }
     // What waits counts if no patch resolves it, or only one that is deeper than the pair.
     void flush() {
@@ -184,7 +258,8 @@ private:
 
     CollideSearch& search_;
     const bool exchanged_;
-    bool settled_ = false;
+    bool settled_ = false, many_ = false;
+    static constexpr uint32_t kFirstSiftBit = CollideSearch::kSiftBits & -CollideSearch::kSiftBits;
     const LastContacts& last_;
     const double size_;
     PairContacts pairs_;

@@ -21,6 +21,11 @@ LastContacts::LastContacts(const ContactManifolds& last, bool exchanged, const R
         const Vec3& n = last.manifolds[i].normal;
         const glm::dvec3 here = glm::dvec3(n.x, n.y, n.z) * to_world.rotation; // the transpose times it
         normals_[i] = exchanged ? -here : here;
+        for (uint32_t k = 0; k < points_of(last.manifolds[i]); ++k) {
+            const ContactPoint& p = last.manifolds[i].points[k];
+            const glm::dvec3 middle = 0.5 * (to_double(p.point_a) + to_double(p.point_b));
+            points_[point_count_++] = (middle - to_world.translation) * to_world.rotation;
+        }
     }
 }
 

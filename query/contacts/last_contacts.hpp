@@ -8,6 +8,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <algorithm>
 #include <cstdint>
 
 namespace prolate::query {
@@ -20,6 +21,8 @@ public:
     uint32_t count() const noexcept { return count_; }
     /// Of a manifold, in A's frame, from A to B.
     const glm::dvec3& normal(uint32_t manifold) const noexcept { return normals_[manifold]; }
+    /// Was there a point of which holds(middle) is true? In A's frame, where the last poses had it in the world.
+    template <class Holds> bool any(Holds&& holds) const { return std::any_of(points_, points_ + point_count_, holds); }
     /// Was there a point of this id, and about this normal?
     bool knows(uint64_t id, const glm::dvec3& normal) const noexcept;
     /// Gives the points of a new manifold that are known the age and the impulse that they had.
@@ -27,8 +30,8 @@ public:
 
 private:
     const ContactManifolds last_;
-    uint32_t count_;
-    glm::dvec3 normals_[kManifolds];
+    uint32_t count_, point_count_ = 0;
+    glm::dvec3 normals_[kManifolds], points_[kManifolds * kManifoldPoints];
 };
 
 } // namespace prolate::query

@@ -14,7 +14,6 @@ using glm::dvec3;
 constexpr double kSameNormal = 0.9;    // cosine
 constexpr double kAgreeing = 1 - 1e-6; // of the weights: a mean that is as long is one of the same normals
 constexpr double kPreferKnown = 1.1;
-constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
 
 // What is known keeps its place against others that are no better than rounding.
 bool instead(const Candidate& old, const Candidate& other, double ahead, double same_point) {
@@ -110,17 +109,6 @@ void Patches::add(const dvec3& normal, const Candidate& candidate, double weight
         return;
     *shallowest = Patch(normal);
     shallowest->add(normal, candidate, weight, overlap, same_point_);
-}
-
-bool Patch::may_take(const PlacedEllipsoid& e, double depth, double same_point) const noexcept {
-    constexpr double kDiagonal = 0.7071067811865476;
-    const dvec3 directions[] = {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
-    if (depth > reach_[0] + std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point)) return true;
-    for (uint32_t i = 0; i < 4; ++i) {
-        const double middle = glm::dot(directions[i], e.center), half = glm::length(directions[i] * e.factor);
-        if (middle + half > reach_[1 + i] + same_point || half - middle > reach_[5 + i] + same_point) return true;
-    }
-    return false;
 }
 
 namespace {

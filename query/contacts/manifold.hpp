@@ -13,8 +13,11 @@
 
 #include <prolate/contacts.hpp>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace prolate::query {
@@ -26,6 +29,11 @@ struct Candidate {
     bool known = false;         // of the last query
     glm::dvec3 normal{0, 0, 1}; // of the pair
     MeetingPair pair;
+};
+
+/// Between which heights something lies along a direction.
+struct Extent {
+    double low, high;
 };
 
 /// Points of about one normal.
@@ -41,9 +49,31 @@ public:
     /// to each other than `same_point` count as one.
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
              double same_point) noexcept;
-    /// May a point of the ellipsoid that is no deeper than `depth` take the place of one, be it deeper by more than 1 %
-    /// or a tenth of same_point, or farther out? Ask only if there are points.
-    bool may_take(const PlacedEllipsoid& e, double depth, double same_point) const noexcept;
+    /// By how much a point that is no deeper than `depth`, and along each direction d within extent(d), may be deeper
+    /// than the deepest, by more than 1 % or a tenth of same_point, or lie farther out than all, by more than
+    /// same_point and than this share of the extent that they have. Not above 0: it takes no place. Ask only if there
+    /// are points.
+    template <class ExtentAlong>
+    double gain(double depth, double same_point, double share, ExtentAlong&& extent) const noexcept {
+        constexpr double kDiagonal = 0.7071067811865476;
+        const glm::dvec3 directions[] = {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
+        double most = depth - reach_[0] - std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point);
+        for (uint32_t i = 0; i < 4; ++i) {
+            const Extent along = extent(directions[i]);
+            const double same = std::max(same_point, share * (reach_[1 + i] + reach_[5 + i]));
+            most = std::max(most, std::max(along.high - reach_[1 + i], -along.low - reach_[5 + i]) - same);
+        }
+        return most;
+    }
+    /// Does a point lie within extent(d) along the patch's two axes?
+    template <class ExtentAlong>
+    bool holds(const glm::dvec3& p, double same_point, ExtentAlong&& extent) const noexcept {
+        const auto within = [&](const glm::dvec3& d) {
+            const Extent along = extent(d);
+            return glm::dot(d, p) >= along.low - same_point && glm::dot(d, p) <= along.high + same_point;
+        };
+        return within(x_) && within(y_);
+    }
     bool empty() const noexcept { return !any_; }
     double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; } ///< of the deepest point
     double overlap() const noexcept { return overlap_; }                      ///< the largest
@@ -52,10 +82,13 @@ public:
     glm::dvec3 normal() const noexcept; ///< the mean
     /// Is the mean one of different normals?
     bool mixed() const noexcept;
+    /// Counts in the mean, without a point.
+    void weigh(const glm::dvec3& normal, double weight) noexcept { sum_ += weight * normal, weight_ += weight; }
     /// The best four or fewer. Returns how many.
     uint32_t reduce(double same_point, Candidate (&out)[kManifoldPoints]) const noexcept;
 
 private:
+    static constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
     double weight_ = 0;
     Candidate sieve_[kSieve];
@@ -80,6 +113,10 @@ public:
     }
     void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept;
     double same_point() const noexcept { return same_point_; }
+    /// Each keeps its number.
+    uint32_t count() const noexcept { return count_; }
+    Patch& operator[](uint32_t i) noexcept { return patches_[i]; }
+    bool full() const noexcept { return count_ == kMost; } ///< one may take another's number
     /// Calls visit(patch) for those that have points.
     template <class Visit> void for_each(Visit&& visit) const {
         for (uint32_t i = 0; i < count_; ++i)

@@ -156,7 +156,13 @@ private:
                   1, depth, same_point);
     }
     bool wanted(uint32_t slot, double bound) const {
-        return patch.empty() || patch.may_take(place(s_.side.tree.bound(slot)), -bound, same_point);
+        if (patch.empty()) return true;
+        const PlacedEllipsoid e = place(s_.side.tree.bound(slot));
+        const auto extent = [&](const dvec3& d) {
+            const double middle = glm::dot(d, e.center), half = glm::length(d * e.factor);
+            return Extent{middle - half, middle + half};
+        };
+        return patch.gain(-bound, same_point, 0, extent) > 0;
     }
 
     uint32_t seen_[16]; // corners that were added last: most belong to several triangles

@@ -53,6 +53,10 @@ private:
     PlacedEllipsoid bound() const { return place(at.tree.bound(at.node)); }
 };
 
+double gap_along(const dvec3& n, const Reaching& a, const Reaching& b, const RelativePose& b_to_a) {
+    return (glm::dot(n, b_to_a.translation) - b.along(-(n * b_to_a.rotation))) - a.along(n);
+}
+
 // The normal of a node's slab to a 127th; 0 without one.
 dvec3 about_normal(const NodeWithHull& at) {
     if (at.hull == nullptr) return dvec3(0);
@@ -68,17 +72,20 @@ bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& 
     return about_the_same(of_a, n) || about_the_same(of_b, n) || about_the_same(of_a, of_b);
 }
 
+double gap_along(const dvec3& n, const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a) noexcept {
+    return gap_along(n, Reaching(a), Reaching(b), b_to_a);
+}
+
 double gap_of_slabs(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double reach) noexcept {
     const Reaching in_a(a), in_b(b);
     // Of flat nodes that are near each other, the centers are where rounding has put them.
     const dvec3 between = b_to_a.rotation * in_b.about_center() + b_to_a.translation - in_a.about_center();
-    const auto gap_along = [&](const dvec3& normal) {
-        const dvec3 n = glm::dot(normal, between) < 0 ? -normal : normal;
-        return (glm::dot(n, b_to_a.translation) - in_b.along(-(n * b_to_a.rotation))) - in_a.along(n);
+    const auto gap_of = [&](const dvec3& normal) {
+        return gap_along(glm::dot(normal, between) < 0 ? -normal : normal, in_a, in_b, b_to_a);
     };
     double gap = -HUGE_VAL;
-    if (in_a.flat) gap = std::max(gap, gap_along(in_a.normal));
-    if (in_b.flat && !(gap > 0)) gap = std::max(gap, gap_along(b_to_a.rotation * in_b.normal));
+    if (in_a.flat) gap = std::max(gap, gap_of(in_a.normal));
+    if (in_b.flat && !(gap > 0)) gap = std::max(gap, gap_of(b_to_a.rotation * in_b.normal));
     return (gap - kSeparationMargin * reach) * (1 - 0x1p-49);
 }
 

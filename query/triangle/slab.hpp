@@ -35,6 +35,11 @@ struct NodeWithHull {
 /// other? Else they will not tell anything that is not known.
 bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, const glm::dvec3& n) noexcept;
 
+/// How far the second node's triangles lie beyond the first's along n, of length 1 and in A's frame; not more, and
+/// little less, if a slab of theirs is perpendicular to n, but for rounding.
+double gap_along(const glm::dvec3& n, const NodeWithHull& a, const NodeWithHull& b,
+                 const RelativePose& b_to_a) noexcept;
+
 /// A lower bound on the distance of what lies below the nodes, from their slabs; without any, or if they do not
 /// separate, not positive or NaN. `reach` is S: triangle_reach() of both trees, and b_to_a.distance.
 double gap_of_slabs(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double reach) noexcept;
