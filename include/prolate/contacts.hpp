@@ -47,7 +47,8 @@ struct ContactResult {
     Verdict verdict = Verdict::undecided; ///< that of collide()
     /// Overlapping though no surfaces meet: a part of one body lies inside the other. There are no points then.
     bool enclosed = false;
-    uint64_t found = 0; ///< pairs of leaves, or of triangles, that meet
+    /// Pairs of leaves, or of triangles, that meet; above 64 not all of them, where many have one normal.
+    uint64_t found = 0;
     QueryStats stats;   ///< looking around a triangle counts as a test of triangles
 };
 
@@ -75,6 +76,10 @@ struct ContactResult {
 ///  4. Of each, keep kManifoldPoints points: the deepest (to within 1 %), and those that span the largest area with it;
 ///     points that the last query had are preferred. (D. Gregorius, "Robust Contact Creation for Physics Simulations",
 ///     Game Developers Conference, 2015.)
+///
+/// What lies in one plane with one normal needs four points, not all of its pairs: once 64 pairs meet, pairs of nodes
+/// are left out along which the bodies only touch, or whose triangles are coplanar, unless they lie farther out than the
+/// points so far by more than a thousandth of their extent. So flat faces cost what their outline does.
 ///
 /// With options.max_level, or of a prefix, nodes stand for all that is in them. A closed mesh is pushed out of the
 /// other body, an open one to the nearer side. Vertices in the same place must be one vertex, as build() makes them.

@@ -14,6 +14,7 @@
 //
 // Complexity: twice collide_all()'s without what is left out, and some microseconds for each pair that meets; for each
 // patch up to 18 climbs and rays.
+#include "query/contacts/contacts.hpp"
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
 #include "query/contacts/node_pair.hpp"
@@ -36,7 +37,7 @@ using glm::dvec3;
 
 constexpr double kSamePoint = 1e-4;   // of the smaller body: what is nearer is one point
 constexpr double kLeastWeight = 1e-7; // of the smaller body: a normal's weight in the mean, if its pair has no depth
-constexpr uint64_t kMany = 64;        // pairs that meet, more than most bodies have
+constexpr uint64_t kTries = 32, kFewResolved = 8; // pairs of nodes; of so many, one has the normal of a patch
 // Shares of a patch's extent: points that lie farther out by less do not matter, to its normal and to its outline.
 constexpr double kFarther = 0x1p-6, kFartherOut = 0x1p-10;
 constexpr double kSlack = 0.25; // of a depth: the normals of curved bodies are means, and no exact ones
@@ -47,8 +48,8 @@ double smaller_size(const CollideSearch& search) {
 
 class Collector {
 public:
-    Collector(CollideSearch& search, QueryContext& context, bool exchanged, const LastContacts& last)
-        : search_(search), exchanged_(exchanged), last_(last), size_(smaller_size(search)),
+    Collector(CollideSearch& search, QueryContext& context, bool exchanged, const LastContacts& last, uint64_t many)
+        : search_(search), exchanged_(exchanged), many_(many), last_(last), size_(smaller_size(search)),
           pairs_(search, context, kSamePoint * size_), patches_(kSamePoint * size_) {
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
         search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
@@ -63,7 +64,8 @@ public:
     // Between the two passes: settles the normals and depths of the manifolds.
     void settle() {
         flush();
-        many_ = search_.found >= kMany;
+        reduce_ = search_.found >= many_ && !gives_up();
+        looked_at_ = resolved_ = 0;
         Group groups[Patches::kMost];
         const uint32_t count = group_patches(groups);
         bool needed[Patches::kMost];
@@ -108,7 +110,7 @@ private:
 
     // CollideSearch::sift.
     QueryContext::Entry* sift(QueryContext::Entry* begin, QueryContext::Entry* end) {
-        if (!(settled_ ? many_ : search_.found >= kMany && !patches_.full())) return end;
+        if (!(settled_ ? reduce_ : search_.found >= many_ && !patches_.full()) || gives_up()) return end;
         double gains[kBlockLanes];
         uint32_t count = 0;
         for (const QueryContext::Entry* from = begin; from < end; ++from) {
@@ -121,12 +123,15 @@ private:
         }
         return begin + count;
     }
+    // Curved bodies have few such pairs, and looking for them would cost time in vain.
+    bool gives_up() const { return looked_at_ >= kTries && resolved_ * kFewResolved < looked_at_; }
     // How much farther out, or deeper, points of a pair of nodes may lie than those that are known of the patch or way
     // that resolves it. Infinite if there is none, or the pair is not flat; not above 0: it need not be looked at.
     double gain_of(QueryContext::Entry& e) {
         const NodePair pair(search_, e.node_a, e.node_b);
         uint32_t resolving = e.flags / kFirstSiftBit; // 0: not known yet, else one more than its number
         if (resolving == 0) resolving = resolving_patch(pair);
+        ++looked_at_, resolved_ += resolving != 0;
         if (resolving == 0) return HUGE_VAL;
         e.flags |= resolving * kFirstSiftBit;
         const auto extent = [&](const dvec3& d) { return pair.extent(d); };
@@ -258,7 +263,9 @@ private:
 
     CollideSearch& search_;
     const bool exchanged_;
-    bool settled_ = false, many_ = false;
+    const uint64_t many_;
+    bool settled_ = false, reduce_ = false;
+    uint64_t looked_at_ = 0, resolved_ = 0; // pairs of nodes, of this pass
     static constexpr uint32_t kFirstSiftBit = CollideSearch::kSiftBits & -CollideSearch::kSiftBits;
     const LastContacts& last_;
     const double size_;
@@ -273,19 +280,19 @@ private:
 };
 
 } // namespace
-} // namespace query
 
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options) noexcept {
-    const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
-    query::CollideSearch search(bodies, context, options);
-    const query::RelativePose to_world = query::relative_pose(Pose{}, bodies.place_a);
-    const query::LastContacts last(manifolds, bodies.exchanged, to_world);
+                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options,
+                       uint64_t many) noexcept {
+    const auto bodies = in_canonical_order(a, pose_a, b, pose_b);
+    CollideSearch search(bodies, context, options);
+    const RelativePose to_world = relative_pose(Pose{}, bodies.place_a);
+    const LastContacts last(manifolds, bodies.exchanged, to_world);
     manifolds = {};
-    query::Collector collector(search, context, bodies.exchanged, last);
+    Collector collector(search, context, bodies.exchanged, last, many);
     search.all = true;
     ContactResult out;
-    out.verdict = query::decide(search);
+    out.verdict = decide(search);
     out.enclosed = out.verdict == Verdict::overlapping && search.found == 0;
     out.found = search.found;
     out.stats = search.stats;
@@ -295,16 +302,23 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
     if (search.found > 0) {
         collector.settle();
         search.found = 0, search.stats = {}, search.other_tests = 0; // what they count is known
-        query::traverse(search);
+        traverse(search);
     }
-    const query::Patch* patches[kManifolds];
+    const Patch* patches[kManifolds];
     manifolds.count = collector.patches(patches);
     for (uint32_t i = 0; i < manifolds.count; ++i) {
         Manifold& m = manifolds.manifolds[i];
-        m = query::manifold_of(*patches[i], collector.same_point(), bodies.exchanged, to_world);
+        m = manifold_of(*patches[i], collector.same_point(), bodies.exchanged, to_world);
         last.hand_on(m);
     }
     return out;
+}
+
+} // namespace query
+
+ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
+                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options) noexcept {
+    return query::contacts(a, pose_a, b, pose_b, manifolds, context, options, query::kMany);
 }
 
 } // namespace prolate
