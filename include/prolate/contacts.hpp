@@ -49,7 +49,7 @@ struct ContactResult {
     bool enclosed = false;
     /// Pairs of leaves, or of triangles, that meet; above 64 not all of them, where many have one normal.
     uint64_t found = 0;
-    QueryStats stats;   ///< looking around a triangle counts as a test of triangles
+    QueryStats stats; ///< looking around a triangle counts as a test of triangles
 };
 
 /// Contacts of `a` at `pose_a` and `b` at `pose_b`, and of what comes within options.margin of each other. Replaces the
@@ -78,8 +78,8 @@ struct ContactResult {
 ///     Game Developers Conference, 2015.)
 ///
 /// What lies in one plane with one normal needs four points, not all of its pairs: once 64 pairs meet, pairs of nodes
-/// are left out along which the bodies only touch, or whose triangles are coplanar, unless they lie farther out than the
-/// points so far by more than a thousandth of their extent. So flat faces cost what their outline does.
+/// are left out along which the bodies only touch, or whose triangles are coplanar, unless they lie farther out than
+/// the points so far by more than a thousandth of their extent. So flat faces cost what their outline does.
 ///
 /// With options.max_level, or of a prefix, nodes stand for all that is in them. A closed mesh is pushed out of the
 /// other body, an open one to the nearer side. Vertices in the same place must be one vertex, as build() makes them.
