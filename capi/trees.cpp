@@ -68,6 +68,8 @@ const char* prolate_status_text(prolate_status status) {
         return "the size or version of a struct is wrong: make it with PROLATE_INIT";
     case PROLATE_NO_ROOM:
         return "the buffer is too small";
+    case PROLATE_BUSY:
+        return "the world is calling a function of the caller's, and must not change";
     default:
         return "unknown status";
     }

@@ -2,7 +2,7 @@
 #include "capi/handles.hpp"
 
 #include <prolate/prolate.h>
-#include <prolate/world.hpp>
+#include <prolate/world_queries.hpp>
 
 #include <memory_resource>
 #include <optional>
@@ -44,23 +44,6 @@ Jobs jobs_of(const prolate_jobs* jobs) {
 template <class T> prolate_status status_of(const Result<T>& result) {
     return result ? PROLATE_OK : static_cast<prolate_status>(result.error().code);
 }
-
-// One prolate_world_collide(), cut up for the jobs.
-struct Verdicts {
-    const World& world;
-    const prolate_body_pair* pairs;
-    QueryContext* contexts;
-    const QueryOptions options;
-    prolate_verdict* out;
-
-    static void run(void* self, uint32_t begin, uint32_t end, uint32_t worker) {
-        const Verdicts& v = *static_cast<const Verdicts*>(self);
-        for (uint32_t i = begin; i < end; ++i) {
-            const Body &a = *v.world.find(same<BodyId>(v.pairs[i].a)), &b = *v.world.find(same<BodyId>(v.pairs[i].b));
-            v.out[i] = verdict_of(collide(a.tree, a.pose, b.tree, b.pose, v.contexts[worker], v.options).verdict);
-        }
-    }
-};
 
 } // namespace
 
@@ -110,7 +93,7 @@ prolate_status prolate_world_insert(prolate_world* world, const prolate_world_bo
     if (!read(body, given)) return PROLATE_BAD_STRUCT;
     const TreeView* const view = view_of(given.tree);
     if (view == nullptr) return PROLATE_BAD_ARGUMENT;
-    Body out{.tree = *view, .pose = same<Pose>(given.pose)};
+    Body out{.shape = *view, .pose = same<Pose>(given.pose)};
     out.user = given.user, out.margin = given.margin;
     if (given.layers != 0 || given.mask != 0) out.layers = given.layers, out.mask = given.mask;
     const auto inserted = world->world->insert(out);
@@ -146,14 +129,8 @@ prolate_status prolate_world_collide(const prolate_world* world, const prolate_b
         (count > 0 && (pairs == nullptr || verdicts == nullptr)))
         return PROLATE_BAD_ARGUMENT;
     if (!read(options, given)) return PROLATE_BAD_STRUCT;
-    for (size_t i = 0; i < count; ++i)
-        for (const prolate_body_id id : {pairs[i].a, pairs[i].b})
-            if (world->world->find(same<BodyId>(id)) == nullptr) return PROLATE_BAD_ID;
-    Verdicts work{*world->world, pairs, contexts, options_of(given), verdicts};
-    constexpr uint32_t kGrain = 8;
-    if (jobs.run == nullptr)
-        Verdicts::run(&work, 0, static_cast<uint32_t>(count), 0);
-    else if (count > 0)
-        jobs.run(jobs.user, static_cast<uint32_t>(count), kGrain, Verdicts::run, &work);
-    return PROLATE_OK;
+    static_assert(sizeof(Verdict) == sizeof(prolate_verdict));
+    return status_of(collide(*world->world, {reinterpret_cast<const BodyPair*>(pairs), count},
+                             std::span(reinterpret_cast<Verdict*>(verdicts), count),
+                             {.contexts = {contexts, jobs.workers}, .jobs = jobs}, options_of(given)));
 }

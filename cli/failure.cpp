@@ -28,6 +28,7 @@ int exit_code(ErrorCode code) {
         return kInterrupted;
     case ErrorCode::internal:
     case ErrorCode::bad_id:
+    case ErrorCode::busy:
         break;
     }
     return kInternal;
@@ -79,7 +80,8 @@ std::string_view advice_for(const Error& error) {
         return kMemoryAdvice;
     case ErrorCode::unsupported: // says itself what to use
     case ErrorCode::cancelled:
-    case ErrorCode::bad_id: // comes from worlds, which the command has none of
+    case ErrorCode::bad_id: // these come from worlds, which the command has none of
+    case ErrorCode::busy:
         break;
     }
     return "";

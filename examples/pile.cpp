@@ -1,5 +1,5 @@
 // Draws COUNT copies of a baked solid together, and counts in each step which of them touch.    pile A.etree COUNT
-#include <prolate/world.hpp>
+#include <prolate/world_queries.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
         const int layer = i / 100, row = i / 10 % 10;
         const auto x = static_cast<float>(i % 10), y = static_cast<float>(row), z = static_cast<float>(layer);
         poses.push_back({{pitch * x, pitch * y, pitch * z}, {x, y, z, 5}});
-        const auto id = world->insert({.tree = tree->view(), .pose = poses.back()});
+        const auto id = world->insert({.shape = tree->view(), .pose = poses.back()});
         if (!id) return fail(id.error());
         ids.push_back(*id);
     }
@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
         const auto pairs = world->update_pairs();
         if (!pairs) return fail(pairs.error());
         results.resize(pairs->size());
-        if (const auto done = world->collide(*pairs, results, contexts); !done) return fail(done.error());
+        if (const auto done = prolate::collide(*world, *pairs, results, {contexts}); !done) return fail(done.error());
         const auto touching =
             std::ranges::count(results, prolate::Verdict::overlapping, &prolate::CollideResult::verdict);
         std::printf("step %2d: %6zu pairs, %6td touch\n", step, pairs->size(), touching);

@@ -67,7 +67,7 @@ void world(benchmark::State& state) {
     World world = *World::create();
     std::vector<BodyId> ids;
     for (size_t i = 0; i < motion.trees.size(); ++i)
-        ids.push_back(*world.insert({.tree = motion.trees[i], .pose = motion.at(0)[i]}));
+        ids.push_back(*world.insert({.shape = motion.trees[i], .pose = motion.at(0)[i]}));
     uint64_t step = 0, pairs = 0, changed = 0, tests = 0, hash = 0;
     (void)world.update_pairs();
     for (auto _ : state) {
@@ -92,7 +92,7 @@ void world_boxes(benchmark::State& state) {
     World world = *World::create({.slack = 1});
     std::vector<BodyId> ids;
     for (size_t i = 0; i < motion.trees.size(); ++i)
-        ids.push_back(*world.insert({.tree = motion.trees[i], .pose = motion.at(0)[i]}));
+        ids.push_back(*world.insert({.shape = motion.trees[i], .pose = motion.at(0)[i]}));
     uint64_t step = 0;
     for (auto _ : state) benchmark::DoNotOptimize(world.move(ids, motion.at(++step)));
 }

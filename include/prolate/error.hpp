@@ -20,6 +20,7 @@ enum class ErrorCode : uint8_t {
     internal = 8,      ///< a promise of the library did not hold; please report it
     out_of_memory = 9, ///< the system or the memory resource has no more; nothing has changed
     bad_id = 10,       ///< an id that names nothing, or nothing any more
+    busy = 14,         ///< not from within a call of the caller's function (11 to 13 are statuses of prolate.h)
 };
 
 /// A failure.

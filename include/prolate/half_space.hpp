@@ -1,13 +1,15 @@
-// Ground: how far is a body from a half-space, and where does it touch it? The half-space takes the place of the second
-// body; query.hpp says what bodies are. shapes.hpp has HalfSpace, and asks for the verdict alone.
+// Ground: how far is a body from a half-space, where does it touch it, and when does it meet it? The half-space takes
+// the place of the second body; query.hpp says what bodies are. shapes.hpp has HalfSpace, and asks for the verdict
+// alone.
 //
 // A half-space is no tree, and reaches everywhere: these queries cost a small part of those against a box for a floor
-// (primitives.hpp). sweep() and worlds take such a box.
+// (primitives.hpp).
 #pragma once
 
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/shapes.hpp>
+#include <prolate/sweep.hpp>
 
 namespace prolate {
 
@@ -27,5 +29,14 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
 /// and touch. Thread-safe on shared trees.
 ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
                        QueryContext& context, const QueryOptions& options = {}) noexcept;
+
+/// When does the moving body first meet the half-space, which is at rest? As sweep() of two bodies, with the same
+/// certificates and tolerance (the body is the smaller one); point_b on the plane below point_a. With a half-space that
+/// is not finite, or whose normal is 0, nothing is certain: undecided, time_lower = 0. Thread-safe on shared trees.
+///
+/// Conservative advancement of the whole body: its lowest point and a bound on the speed of any point towards the
+/// plane.
+SweepResult sweep(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, QueryContext& context,
+                  const SweepOptions& options = {}) noexcept;
 
 } // namespace prolate

@@ -39,7 +39,7 @@ extern "C" {
 /** A struct of this type with its size and version set, and all else 0. C only: C++ has headers of its own. */
 #define PROLATE_INIT(type) ((type){.size = sizeof(type), .version = PROLATE_API_VERSION})
 
-/** What went wrong. Values are stable; 1 to 10 are those of prolate::ErrorCode. */
+/** What went wrong. Values are stable; 1 to 10, and 14, are those of prolate::ErrorCode. */
 typedef int32_t prolate_status;
 enum {
     PROLATE_OK = 0,
@@ -55,7 +55,8 @@ enum {
     PROLATE_BAD_ID = 10,
     PROLATE_BAD_ARGUMENT = 11, /**< a pointer is NULL, or scratch too small or not aligned */
     PROLATE_BAD_STRUCT = 12,   /**< the size or version of a struct */
-    PROLATE_NO_ROOM = 13       /**< a buffer is too small; *needed says how large it must be */
+    PROLATE_NO_ROOM = 13,      /**< a buffer is too small; *needed says how large it must be */
+    PROLATE_BUSY = 14          /**< a world is calling a function of the caller's, and must not change */
 };
 
 /** One line of English, static; of any number. */

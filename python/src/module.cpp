@@ -32,6 +32,8 @@ const char* name_of(ErrorCode code) {
         return "out_of_memory";
     case ErrorCode::bad_id:
         return "bad_id";
+    case ErrorCode::busy: // comes from the caller's functions, which Python has none of
+        break;
     }
     return "internal";
 }

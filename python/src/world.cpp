@@ -4,7 +4,7 @@
 #include "python/src/tree.hpp"
 
 #include <prolate/tbb.hpp>
-#include <prolate/world.hpp>
+#include <prolate/world_queries.hpp>
 
 #include <mutex>
 #include <unordered_map>
@@ -37,7 +37,7 @@ public:
         const Poses poses(pose, "pose", wxyz);
         if (!poses.single()) value_error("pose", "must be one pose");
         const RoundedPose at = rounded(poses, 0, held.reach);
-        const Body body{.tree = held.view,
+        const Body body{.shape = held.view,
                         .pose = at.pose,
                         .layers = static_cast<uint32_t>(whole(layers, "layers", 0, UINT32_MAX)),
                         .mask = static_cast<uint32_t>(whole(mask, "mask", 0, UINT32_MAX)),
@@ -87,7 +87,7 @@ public:
             oneapi::tbb::task_arena arena(workers);
             const Jobs jobs = workers > 1 ? tbb_jobs(arena) : Jobs{};
             const std::unique_ptr<QueryContext[]> contexts(new QueryContext[jobs.workers]);
-            return world_.collide(pairs, results, {contexts.get(), jobs.workers}, jobs, options);
+            return prolate::collide(world_, pairs, std::span(results), {{contexts.get(), jobs.workers}, jobs}, options);
         }));
         auto verdicts = new_array<uint8_t>(results.size());
         for (size_t i = 0; i < results.size(); ++i) verdicts[i] = static_cast<uint8_t>(results[i].verdict);

@@ -10,6 +10,7 @@
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
 #include "query/contacts/pair_contacts.hpp"
+#include "query/half_space/lowest.hpp"
 #include "query/half_space/search.hpp"
 #include "query/triangle/placed.hpp"
 
@@ -24,72 +25,12 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSamePoint = 1e-4; // of the body: what is nearer is one point
-
-bool is_finite(const PlacedHalfSpace& h) {
-    return std::isfinite(h.normal.x + h.normal.y + h.normal.z + h.offset + h.reach);
-}
-// Of a point, in the tree's frame.
-double height(const dvec3& p, const PlacedHalfSpace& h) {
-    return glm::dot(h.normal, p) - h.offset;
-}
 PlacedHalfSpace moved(PlacedHalfSpace h, double margin) {
     h.offset += margin, h.reach += margin;
     return h;
 }
-// The lowest point of an ellipsoid.
-dvec3 lowest(const PlacedEllipsoid& e, const dvec3& n) {
-    const dvec3 m = n * e.factor;
-    const double length = glm::length(m);
-    return length > 0 ? e.center - e.factor * (m / length) : e.center;
-}
 
-// The lowest point of a body.
-class Lowest {
-public:
-    explicit Lowest(HeightSearch& search) : s_(search) {
-        s_.user = this;
-        s_.leaf = [](void* self, uint32_t slot) { return static_cast<Lowest*>(self)->leaf(slot); };
-    }
-
-    double lower = kInfinity;  // no leaf that was looked at is lower
-    double height = kInfinity; // of the lowest point, which is
-    dvec3 point{0, 0, 0};      // this one
-    double slack = 0;          // what its height may be wrong by
-    MeetingPair pair{};
-    bool meets = false; // some leaf, by separated()
-
-private:
-    bool leaf(uint32_t slot) {
-        const TriangleRange range = s_.side.tree.triangles(slot);
-        if (std::max(range.count, 1u) > s_.left()) return false;
-        s_.stats.triangle_tests += std::max(range.count, 1u);
-        if (range.count == 0) {
-            const PlacedEllipsoid e = place(s_.side.tree.bound(slot));
-            consider(lowest(e, s_.shape.normal), e.reach, !separated(e, s_.shape), {slot, 0, kNoTriangle, kNoTriangle});
-        }
-        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
-            const PlacedTriangle triangle = place(s_.side.tree, t);
-            const dvec3* const low =
-                std::min_element(triangle.corner, triangle.corner + 3, [&](const dvec3& a, const dvec3& b) {
-                    return glm::dot(s_.shape.normal, a) < glm::dot(s_.shape.normal, b);
-                });
-            consider(*low, triangle.reach, !separated(triangle, s_.shape), {slot, 0, t, kNoTriangle});
-        }
-        return true;
-    }
-    void consider(const dvec3& p, double reach, bool meet, const MeetingPair& of) {
-        const double here = query::height(p, s_.shape), rounding = kSeparationMargin * (reach + s_.shape.reach);
-        meets = meets || meet;
-        lower = std::min(lower, meet ? 0 : std::max(here - rounding, std::numeric_limits<double>::min()));
-        if (!(here < height)) return;
-        height = here, point = p, pair = of, slack = rounding;
-        s_.limit = std::min(s_.limit, here + rounding);
-    }
-
-    HeightSearch& s_;
-};
+constexpr double kSamePoint = 1e-4; // of the body: what is nearer is one point
 
 // All corners and ellipsoids that touch, sieved.
 class Touching {
@@ -125,7 +66,7 @@ private:
         if (range.count == 0) {
             const PlacedEllipsoid e = place(tree.bound(slot));
             if (!separated(e, touched_))
-                add(lowest(e, s_.shape.normal), {Part::Kind::node, slot, 0}, slot, kNoTriangle);
+                add(lowest_point(e, s_.shape.normal), {Part::Kind::node, slot, 0}, slot, kNoTriangle);
         }
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             const PlacedTriangle triangle = place(tree, t);
@@ -184,7 +125,7 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
     out.stats.deepest_level = search.side.deepest_level();
     const double cut = std::min(lowest.lower, query::sound_length(options.max_distance));
     out.lower = std::max(0.0, std::min(cut, search.open));
-    if (lowest.height < query::kInfinity)
+    if (lowest.height < HUGE_VAL)
         out.upper = std::max(0.0, lowest.meets ? lowest.height : lowest.height + lowest.slack);
     if (lowest.meets)
         out.verdict = Verdict::overlapping, out.lower = 0;
@@ -222,7 +163,7 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
     out.stats.deepest_level = search.side.deepest_level();
     if (touching.meets)
         out.verdict = Verdict::overlapping;
-    else if (!(search.open < query::kInfinity))
+    else if (!(search.open < HUGE_VAL))
         out.verdict = Verdict::separated;
     if (touching.patch.empty()) return out;
     manifolds.count = 1;

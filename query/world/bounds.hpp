@@ -38,6 +38,9 @@ LocalBounds local_bounds(const TreeView& tree) noexcept;
 Bounds bounds_at(const TreeView& tree, const RelativePose& to_world, float margin, double tolerance = kReachTolerance,
                  double rounding = kSeparationMargin) noexcept;
 
+/// Of the boxes of a World, small beside their slack: half as dear as those of bounds().
+inline constexpr double kBoxTolerance = 0x1p-6;
+
 /// Where a tree is, as far as motion is concerned.
 struct Anchor {
     glm::dmat3 rotation{};

@@ -64,8 +64,9 @@ public:
 private:
     void consider(uint32_t index, uint32_t other) {
         const World::State::Mark &own = s_.marks[index], &others = s_.marks[other];
-        if (other == index || (other < index && others.changed)) return;
+        if (own.body == others.body || (other < index && others.changed)) return;
         if ((own.layers & others.mask) == 0 || (others.layers & own.mask) == 0) return;
+        if ((own.half_space || others.half_space) && s_.apart_from_half_space(index, other)) return;
         const auto [a, b] = std::minmax(index, other);
         if (s_.options.filter && !s_.options.filter(s_.options.filter_user, s_.entries[a].body, s_.entries[b].body))
             return;
@@ -92,7 +93,8 @@ void World::State::reserve_pairs(uint32_t count_of_pairs) {
     if (found.size() < count_of_pairs) found.resize(count_of_pairs);
     pairs.reserve(count_of_pairs);
     next_pairs.reserve(count_of_pairs);
-    free_slots.reserve(count_of_pairs);
+    ended.reserve(count_of_pairs);
+    free_slots.reserve(2 * size_t{count_of_pairs}); // slots: of pairs, and of those that have ended
 }
 
 uint64_t World::State::find_pairs(const Jobs& jobs) {
@@ -121,8 +123,10 @@ void World::State::merge_pairs(uint64_t found_count) {
     const uint64_t total = found_count + static_cast<uint64_t>(std::ranges::count_if(pairs, stays));
     if (total > UINT32_MAX) throw std::bad_alloc();
     next_pairs.reserve(static_cast<size_t>(total));
+    ended.reserve(pairs.size());
     free_slots.reserve(slot_count);
-
+    for (const BodyPair& p : ended) free_slots.push_back(p.slot); // the caller has had time to look them up
+    ended.clear();
     next_pairs.clear();
     const auto add = [&](BodyId a, BodyId b, uint32_t slot) {
         const bool either_moved = marks[a.index].moved || marks[b.index].moved;
@@ -137,7 +141,7 @@ void World::State::merge_pairs(uint64_t found_count) {
         if (goes_on) {
             add(old->a, old->b, old->slot);
         } else {
-            if (old_key <= new_key) free_slots.push_back(old->slot);
+            if (old_key <= new_key) ended.push_back(*old);
             if (new_key <= old_key)
                 add(id(static_cast<uint32_t>(new_key >> 32)), id(static_cast<uint32_t>(new_key)), kNoSlot);
         }
@@ -160,7 +164,9 @@ void World::State::merge_pairs(uint64_t found_count) {
 }
 
 Result<std::span<const BodyPair>> World::update_pairs(const Jobs& jobs) noexcept {
+    if (state_->busy()) return query::kBusy;
     try {
+        const State::Busy busy(*state_);
         state_->merge_pairs(state_->find_pairs(jobs));
         return pairs();
     } catch (...) {
@@ -170,6 +176,10 @@ Result<std::span<const BodyPair>> World::update_pairs(const Jobs& jobs) noexcept
 
 std::span<const BodyPair> World::pairs() const noexcept {
     return state_->pairs;
+}
+
+std::span<const BodyPair> World::ended_pairs() const noexcept {
+    return state_->ended;
 }
 
 uint32_t World::slot_count() const noexcept {

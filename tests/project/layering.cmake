@@ -22,7 +22,7 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|poses|bounds|jobs|world|tools|glm")
+set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|poses|bounds|jobs|world|world_queries|tools|glm")
 set(query_folders "src|query")
 set(query_libraries "glm/.*|hwy/.*")
 # Inside query/: each folder may include itself and these, so queries do not know each other.
@@ -35,7 +35,7 @@ set(query/inside_knows "simd ellipsoid triangle node")
 foreach(folder collide distance sweep raycast shapes points)
   set(query/${folder}_knows "${query_geometry}")
 endforeach()
-set(query/half_space_knows "${query_geometry} collide contacts shapes")
+set(query/half_space_knows "${query_geometry} collide contacts shapes sweep")
 set(query/contacts_knows "${query_geometry} collide")
 set(query/world_knows "${query_geometry} collide contacts distance sweep raycast shapes")
 
@@ -43,7 +43,7 @@ set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
-set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|bounds|jobs|world")
+set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|bounds|poses|jobs|world|world_queries")
 set(capi_folders "capi")
 set(capi_libraries "prolate/prolate\\.h")
 

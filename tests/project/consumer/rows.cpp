@@ -18,6 +18,7 @@
 #include <prolate/tbb.hpp>
 #endif
 #include <prolate/world.hpp>
+#include <prolate/world_queries.hpp>
 
 #include <cstdio>
 
@@ -73,9 +74,12 @@ int main(int argc, char** argv) {
     row("poses.hpp", asked && results[0].verdict == Verdict::overlapping && results[1].verdict == Verdict::separated);
 
     auto world = World::create();
-    const bool inserted = world && world->insert({.tree = tree, .pose = here}) &&
-                          world->insert({.tree = tree, .pose = near}) && world->insert({.tree = tree, .pose = far});
+    const bool inserted = world && world->insert({.shape = tree, .pose = here}) &&
+                          world->insert({.shape = tree, .pose = near}) && world->insert({.shape = tree, .pose = far});
     row("world.hpp", inserted && world->update_pairs()->size() == 1);
+    Verdict verdict{};
+    row("world_queries.hpp",
+        inserted && collide(*world, world->pairs(), {&verdict, 1}, {{&context, 1}}) && verdict == Verdict::overlapping);
     row("jobs.hpp", inserted && world->update_pairs(Jobs{})->size() == 1);
 #ifdef WITH_TBB
     oneapi::tbb::task_arena arena(2);

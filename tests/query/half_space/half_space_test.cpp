@@ -221,5 +221,97 @@ TEST(HalfSpace, WhatIsNotFiniteIsNeverSeparated) {
     }
 }
 
+// At sampled times before time_lower no corner is in the half-space, and at time_upper one is as near as the tolerance.
+TEST(HalfSpace, SweepsAgainstAllCornersAtManyTimes) {
+    const Bodies bodies;
+    Random random(21);
+    const auto context = std::make_unique<QueryContext>();
+    uint32_t hits = 0, misses = 0, at_start = 0;
+    uint64_t tests = 0;
+    for (uint32_t i = 0; i < 400; ++i) {
+        const TreeView tree = bodies.trees[i % bodies.trees.size()];
+        const HalfSpace shape = ground(random);
+        const Plane plane = plane_of(shape);
+        const double far = i % 7 == 0 ? 1e4 : 1;
+        Motion motion;
+        motion.start = scenes::pose_at(random, far * random.in(0, 4));
+        const Point v = random.in_ball(), w = random.in_ball(), c = random.in_ball();
+        motion.linear = scenes::to_float({5 * v[0], 5 * v[1], 5 * v[2]});
+        motion.angular = scenes::to_float({6 * w[0], 6 * w[1], 6 * w[2]});
+        motion.center = scenes::to_float(c);
+        if (far > 1) { // level with the plane again
+            const Real height = plane.height(reference::vector(motion.start.translation)) - 3;
+            motion.start.translation.x -= static_cast<float>(height * plane.normal[0]);
+            motion.start.translation.y -= static_cast<float>(height * plane.normal[1]);
+            motion.start.translation.z -= static_cast<float>(height * plane.normal[2]);
+        }
+        const float margin = i % 3 == 0 ? 0.1f : 0;
+        const double tolerance = i % 2 == 0 ? 0.01 : 1e-5;
+        const SweepResult r = sweep(tree, motion, shape, *context, {.tolerance = tolerance, .margin = margin});
+        tests += r.stats.tests();
+        // pose_at() rounds to floats once: what that moves a corner by.
+        const Real rounding = 4e-7L * (far * 5 + 10);
+        const auto lowest = [&](double t) {
+            const std::vector<Real> h = heights(tree, pose_at(motion, t), plane);
+            return *std::min_element(h.begin(), h.end());
+        };
+        for (int k = 0; k < 50 && r.time_lower > 0; ++k)
+            EXPECT_GT(lowest(r.time_lower * k / 50), margin - rounding) << i;
+        if (r.verdict == Verdict::separated) {
+            EXPECT_EQ(r.time_lower, 1);
+            EXPECT_TRUE(std::isinf(r.time_upper));
+            EXPECT_GT(lowest(1), margin - rounding);
+            ++misses;
+            continue;
+        }
+        ASSERT_EQ(r.verdict, Verdict::overlapping) << i;
+        EXPECT_EQ(r.time_lower, r.time_upper);
+        EXPECT_LT(lowest(r.time_upper), margin + static_cast<Real>(tolerance) + rounding);
+        EXPECT_LT(r.distance, double{margin} + tolerance + 1e-6 * far);
+        EXPECT_NEAR(static_cast<double>(plane.height(reference::vector(r.point_a))),
+                    r.time_upper == 0 ? static_cast<double>(lowest(0)) : r.distance, 1e-5 * far + 1e-6);
+        ++(r.time_upper > 0 ? hits : at_start);
+    }
+    EXPECT_GT(hits, 50u);
+    EXPECT_GT(misses, 80u);
+    EXPECT_GT(at_start, 20u);
+    EXPECT_LT(tests / 400, 3000u);
+}
+
+TEST(HalfSpace, SweepsKeepTheirWordOnABudget) {
+    const Bodies bodies;
+    const auto context = std::make_unique<QueryContext>();
+    Motion motion;
+    motion.start.translation = {0, 0, 5}, motion.linear = {0, 0, -8}, motion.angular = {1, 2, 3};
+    const HalfSpace floor{{0, 0, 1}, 0};
+    for (const TreeView& tree : bodies.trees) {
+        const SweepResult whole = sweep(tree, motion, floor, *context);
+        ASSERT_EQ(whole.verdict, Verdict::overlapping);
+        double lower = 0;
+        for (uint64_t budget = 0; budget < whole.stats.tests() + 10; ++budget) {
+            const SweepResult r = sweep(tree, motion, floor, *context, {.max_pair_tests = budget});
+            EXPECT_LE(r.stats.tests(), budget);
+            EXPECT_GE(r.time_lower, lower);
+            EXPECT_LE(r.time_lower, whole.time_upper);
+            EXPECT_TRUE(r.verdict == Verdict::overlapping || r.verdict == Verdict::undecided);
+            lower = r.time_lower;
+        }
+        EXPECT_EQ(lower, whole.time_lower);
+    }
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    for (const HalfSpace& odd : {HalfSpace{{0, 0, 0}, 0}, HalfSpace{{0, 0, nan}, 0}, HalfSpace{{0, 0, 1}, nan}}) {
+        const SweepResult r = sweep(bodies.trees[0], motion, odd, *context);
+        EXPECT_EQ(r.verdict, Verdict::undecided);
+        EXPECT_EQ(r.time_lower, 0);
+    }
+    for (Motion odd : {motion, motion, motion}) {
+        static int which = 0;
+        if (which == 0) odd.linear.y = nan;
+        if (which == 1) odd.start.rotation = {0, 0, 0, 0};
+        if (which++ == 2) odd.angular.x = 2e6f;
+        EXPECT_EQ(sweep(bodies.trees[0], odd, floor, *context).verdict, Verdict::undecided);
+    }
+}
+
 } // namespace
 } // namespace prolate

@@ -2,7 +2,7 @@
 #include "tests/scenes.hpp"
 
 #include <prolate/tbb.hpp>
-#include <prolate/world.hpp>
+#include <prolate/world_queries.hpp>
 
 #include <gtest/gtest.h>
 
@@ -47,12 +47,12 @@ TEST(Tbb, GivesTheSameWorld) {
     const auto run = [&](const Jobs& jobs) {
         World world = *World::create();
         std::vector<BodyId> ids;
-        for (size_t i = 0; i < poses.size(); ++i) ids.push_back(*world.insert({.tree = tree, .pose = {}}));
+        for (size_t i = 0; i < poses.size(); ++i) ids.push_back(*world.insert({.shape = tree, .pose = {}}));
         EXPECT_TRUE(world.move(ids, poses, jobs));
         const auto pairs = *world.update_pairs(jobs);
         std::vector<CollideResult> results(pairs.size());
         std::vector<QueryContext> contexts(jobs.workers);
-        EXPECT_TRUE(world.collide(pairs, results, contexts, jobs));
+        EXPECT_TRUE(collide(world, pairs, results, {contexts, jobs}));
         std::vector<uint64_t> out;
         for (size_t i = 0; i < pairs.size(); ++i)
             out.insert(out.end(),
