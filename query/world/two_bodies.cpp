@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 namespace prolate::query {
 namespace {
@@ -91,6 +93,14 @@ bool separated(const RoundedBox& shape, const HalfSpace& ground) {
     return glm::dot(unit, shape.center) - width - offset > kSeparationMargin * (shape.reach + std::abs(offset));
 }
 
+// std::visit() throws, if it were for a variant without a value.
+template <class Call> auto of(const Probe& probe, Call&& call) {
+    if (const auto* const sphere = std::get_if<Sphere>(&probe)) return call(*sphere);
+    if (const auto* const capsule = std::get_if<Capsule>(&probe)) return call(*capsule);
+    if (const auto* const box = std::get_if<Box>(&probe)) return call(*box);
+    return call(*std::get_if<PlacedTree>(&probe));
+}
+
 } // namespace
 
 CollideResult collide(const Body& a, const Body& b, QueryContext& context, const QueryOptions& options,
@@ -144,37 +154,32 @@ RaycastResult raycast(const Body& body, const Ray& ray, QueryContext& context, c
 }
 
 Verdict overlap(const Body& body, const Probe& probe, QueryContext& context, const QueryOptions& options) noexcept {
-    return std::visit(
-        [&](const auto& p) {
-            if constexpr (std::is_same_v<decltype(p), const PlacedTree&>) {
-                if (body.tree() != nullptr)
-                    return prolate::collide(*body.tree(), body.pose, p.tree, p.pose, context, options).verdict;
-                return prolate::overlap(p.tree, p.pose, *body.half_space(), context, options).verdict;
-            } else {
-                if (body.tree() != nullptr)
-                    return prolate::overlap(*body.tree(), body.pose, p, context, options).verdict;
-                return separated(place(p, Pose{}, sound(options).margin), *body.half_space()) ? Verdict::separated
-                                                                                              : Verdict::overlapping;
-            }
-        },
-        probe);
+    return of(probe, [&]<class Shape>(const Shape& p) {
+        const TreeView* const tree = body.tree();
+        if constexpr (std::is_same_v<Shape, PlacedTree>) {
+            if (tree != nullptr) return prolate::collide(*tree, body.pose, p.tree, p.pose, context, options).verdict;
+            return prolate::overlap(p.tree, p.pose, *body.half_space(), context, options).verdict;
+        } else {
+            if (tree != nullptr) return prolate::overlap(*tree, body.pose, p, context, options).verdict;
+            const RoundedBox shape = place(p, Pose{}, sound(options).margin);
+            return separated(shape, *body.half_space()) ? Verdict::separated : Verdict::overlapping;
+        }
+    });
 }
 
 Bounds bounds_of(const Probe& probe, float margin) noexcept {
-    return std::visit(
-        [&](const auto& p) -> Bounds {
-            if constexpr (std::is_same_v<decltype(p), const PlacedTree&>) {
-                return bounds(p.tree, p.pose, margin);
-            } else {
-                const RoundedBox shape = place(p, Pose{}, margin);
-                dvec3 half(shape.radius + kSeparationMargin * shape.reach);
-                for (glm::length_t i = 0; i < 3; ++i) half += glm::abs(shape.axes[i] * shape.half[i]);
-                const dvec3 low = shape.center - half, high = shape.center + half;
-                return {{round_down(low.x), round_down(low.y), round_down(low.z)},
-                        {round_up(high.x), round_up(high.y), round_up(high.z)}};
-            }
-        },
-        probe);
+    return of(probe, [&]<class Shape>(const Shape& p) {
+        if constexpr (std::is_same_v<Shape, PlacedTree>) {
+            return bounds(p.tree, p.pose, margin);
+        } else {
+            const RoundedBox shape = place(p, Pose{}, margin);
+            dvec3 half(shape.radius + kSeparationMargin * shape.reach);
+            for (glm::length_t i = 0; i < 3; ++i) half += glm::abs(shape.axes[i] * shape.half[i]);
+            const dvec3 low = shape.center - half, high = shape.center + half;
+            return Bounds{{round_down(low.x), round_down(low.y), round_down(low.z)},
+                          {round_up(high.x), round_up(high.y), round_up(high.z)}};
+        }
+    });
 }
 
 } // namespace prolate::query

@@ -10,8 +10,6 @@
 namespace prolate {
 namespace {
 
-using query::BoundsTree;
-
 constexpr uint32_t kMostBodies = uint32_t{1} << 30; // the tree's nodes, twice as many, have 32-bit numbers
 constexpr uint32_t kGrain = 64;                     // boxes
 
@@ -130,9 +128,13 @@ Result<BodyId> World::insert(const Body& body, std::span<const Part> parts) noex
     const uint32_t index = s.add({.body = body});
     uint32_t last = index;
     for (const Part& part : parts) {
-        State::Entry entry{.body = body, .in_body = part.pose};
-        entry.body.shape = part.tree, entry.body.pose = part_pose(body.pose, part.pose);
-        last = s.entries[last].next = s.add(entry);
+        const Body own{.shape = part.tree,
+                       .pose = part_pose(body.pose, part.pose),
+                       .user = body.user,
+                       .layers = body.layers,
+                       .mask = body.mask,
+                       .margin = body.margin};
+        last = s.entries[last].next = s.add({.body = own, .in_body = part.pose});
         s.marks[last].body = index;
     }
     return s.id(index);

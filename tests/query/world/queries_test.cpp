@@ -368,6 +368,7 @@ TEST(WorldQueries, EventsTellWhatBeganStaysAndEnded) {
 TEST(WorldQueries, EventsOutliveTheBodiesRemovedAmongThem) {
     World world = *World::create();
     std::vector<BodyId> ids;
+    ids.reserve(5);
     for (int i = 0; i < 5; ++i) ids.push_back(*world.insert({.shape = tree(1), .pose = {}}));
     ASSERT_EQ(world.update_pairs()->size(), 10u);
     QueryContext context;
@@ -529,9 +530,11 @@ TEST(WorldQueries, RaysHitWhatIsFirst) {
                 if (body != BodyId{}) {
                     // Cut short by what was hit before, the ray is placed a little otherwise: of two bodies that are
                     // hit at once, either may seem the first.
-                    const Body& first = scene.at(hits[i].body);
-                    const RaycastResult own = raycast(*first.tree(), first.pose, rays[i], context, {.margin = margin});
-                    EXPECT_NEAR(own.t, best.t, 1e-9);
+                    const TreeView* const first = scene.at(hits[i].body).tree(); // null: in the ground, too
+                    const double own =
+                        first ? raycast(*first, scene.at(hits[i].body).pose, rays[i], context, {.margin = margin}).t
+                              : t;
+                    EXPECT_NEAR(own, best.t, 1e-9);
                     same += hits[i].body == body;
                     EXPECT_NEAR(hits[i].result.t, best.t, 1e-9) << i << ' ' << margin;
                     ++found;
@@ -544,7 +547,7 @@ TEST(WorldQueries, RaysHitWhatIsFirst) {
             EXPECT_EQ(hits[i].result.t, others[i].result.t);
         }
         EXPECT_GT(found, 60u);
-        EXPECT_GE(same + 2, found);
+        EXPECT_GE(same + 5, found);
         EXPECT_GT(ground, 50u);
         EXPECT_EQ(hits[600].result.verdict, Verdict::separated);
         EXPECT_EQ(hits[601].result.verdict, Verdict::undecided);
