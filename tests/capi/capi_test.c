@@ -196,27 +196,31 @@ static void test_worlds(void) {
     CHECK_OK(prolate_world_create(NULL, &allocator, &world));
     CHECK(allocated > 0);
     CHECK_OK(prolate_world_reserve(world, 16, 64));
-    prolate_body_id ids[5];
+    prolate_body_id ids[12];
     prolate_world_body body = PROLATE_INIT(prolate_world_body);
     body.tree = &box;
     body.pose.rotation = upright;
-    for (int i = 0; i < 5; ++i) {
+    for (int i = 0; i < 12; ++i) {
         body.pose.translation.x = 0.9f * (float)i;
         CHECK_OK(prolate_world_insert(world, &body, &ids[i]));
     }
     int runs = 0;
-    const prolate_jobs jobs = {run, &runs, 1};
+    const prolate_jobs jobs = {run, &runs, 2};
     const prolate_body_pair* pairs = NULL;
     size_t count = 0;
     CHECK_OK(prolate_world_update_pairs(world, &jobs, &pairs, &count));
-    CHECK(count >= 4);
+    CHECK(count >= 11);
     prolate_verdict* const verdicts = malloc(count + 1);
-    CHECK_OK(prolate_world_collide(world, pairs, count, &jobs, scratch, scratch_size, NULL, verdicts));
+    void* const both = aligned_alloc(64, 2 * scratch_size); /* one for each worker */
+    CHECK_STATUS(prolate_world_collide(world, pairs, count, &jobs, both, scratch_size, NULL, verdicts),
+                 PROLATE_BAD_ARGUMENT);
+    CHECK_OK(prolate_world_collide(world, pairs, count, &jobs, both, 2 * scratch_size, NULL, verdicts));
     int meeting = 0;
     for (size_t i = 0; i < count; ++i) meeting += verdicts[i] == PROLATE_OVERLAPPING;
-    CHECK(meeting == 4 && runs > 0);
+    CHECK(meeting == 11 && runs > 0);
     CHECK_OK(prolate_world_collide(world, pairs, count, NULL, scratch, scratch_size, NULL, verdicts));
     free(verdicts);
+    free(both);
     CHECK_OK(prolate_world_move(world, ids[0], (prolate_pose){{50, 0, 0}, upright}));
     CHECK_OK(prolate_world_remove(world, ids[4]));
     CHECK_STATUS(prolate_world_remove(world, ids[4]), PROLATE_BAD_ID);
