@@ -5,7 +5,6 @@
 #include "query/triangle/ellipsoid_distance.hpp"
 #include "query/triangle/separation.hpp"
 #include "query/triangle/support.hpp"
-#include "src/slab.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -67,8 +66,15 @@ Slabs CollideSearch::slabs_of(const NodeWithHull& node_a, const NodeWithHull& no
     const double reach = reach_of_triangles(), least = double{options.margin} + skin;
     const double gap = gap_of_slabs(node_a, node_b, b_to_a, reach);
     if (gap > least) return Slabs::separated;
-    const auto flat = [](const NodeWithHull& at) { return at.hull != nullptr && has_slab(at.hull); };
-    return gap > least - kInOnePlane * reach && flat(node_a) && flat(node_b) ? Slabs::in_one_plane : Slabs::say_nothing;
+    const bool in_one_plane = gap > least - kInOnePlane * reach && is_flat(node_a) && is_flat(node_b);
+    return in_one_plane ? Slabs::in_one_plane : Slabs::say_nothing;
+}
+
+bool CollideSearch::slabs_separate_roots() noexcept {
+    const NodeWithHull root_a = with_hull(a.tree, 0), root_b = with_hull(b.tree, 0);
+    const double least = double{options.margin} + skin;
+    return is_flat(root_a) && is_flat(root_b) && face_each_other(root_a, root_b, b_to_a, least) &&
+           gap_of_slabs(root_a, root_b, b_to_a, reach_of_triangles()) > least;
 }
 
 // Are the triangles farther apart than margin + skin along this direction?

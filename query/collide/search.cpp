@@ -44,7 +44,8 @@ constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2, kInOnePlane = 4;
 // look costs more than it saves.
 constexpr float kNearlySeparated = 0.88f, kLeavesNearlySeparated = 0.75f;
 
-template <bool kMargin> class CollideTraversal {
+// kSifts: search.sift is not null, and the margin may be 0 though kMargin is set.
+template <bool kMargin, bool kSifts> class CollideTraversal {
     using Side = HWY_NAMESPACE::Side<PlacedNode>;
 
 public:
@@ -64,10 +65,11 @@ private:
         // The roots, as if B's were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         pair_tests_ = 1;
+        if (s_.a.has_slabs && s_.b.has_slabs && s_.slabs_separate_roots()) return Verdict::separated;
         if (test_all(kOpenB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
         while (size_ > 0) {
             auto e = stack_[--size_];
-            if (s_.sift != nullptr && s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
+            if (kSifts && s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
             const uint32_t open = e.flags & kOpenB;
             const uint32_t node = open != 0 ? e.node_b : e.node_a, other = open != 0 ? e.node_a : e.node_b;
             const Side& side = sides_[open];
@@ -126,18 +128,28 @@ private:
         const float reach_b = reach(own, -kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
         return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
     }
-    // Of the roots, and once there are more pairs than usual: much is equally near.
-    bool slabs_pay() const { return have_slabs_ && (block_tests_ == 1 || block_tests_ > kPatience); }
-    // What their slabs say.
-    HWY_NOINLINE Slabs slabs_of(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
-        const std::byte *const of_other = hull_at(sides_[open ^ kOpenB], other), *const own =
-                                                                                     hull_at(sides_[open], node);
-        const auto flat = [](const std::byte* hull) { return hull != nullptr && has_slab(hull); };
-        if (!flat(of_other) && !flat(own)) return Slabs::say_nothing;
+    // Once there are more pairs than usual: much is equally near.
+    bool slabs_pay() const { return have_slabs_ && block_tests_ > kPatience; }
+    // Takes those of the pairs from stack_[before] on, which a block has put there, that slabs separate.
+    HWY_NOINLINE void sift_by_slabs(uint32_t before, uint32_t open, const Kept& kept) {
+        const uint32_t end = std::exchange(size_, before);
+        for (uint32_t i = before; i < end; ++i) {
+            QueryContext::Entry e = stack_[i];
+            const Slabs slabs = slabs_of(open, e, kept);
+            if (slabs == Slabs::separated) continue;
+            if (slabs == Slabs::in_one_plane) e.flags |= kInOnePlane;
+            stack_[size_++] = e;
+        }
+    }
+    // What the slabs of a pair say.
+    Slabs slabs_of(uint32_t open, const QueryContext::Entry& e, const Kept& kept) {
+        const NodeWithHull a{s_.a.tree, e.node_a, hull_at(sides_[0], e.node_a)},
+            b{s_.b.tree, e.node_b, hull_at(sides_[1], e.node_b)};
+        if (!is_flat(a) && !is_flat(b)) return Slabs::say_nothing;
+        const uint32_t lane = (open != 0 ? e.node_b : e.node_a) % kBlockLanes;
         const glm::dvec3 n =
-            glm::normalize(glm::dvec3(kept.n[0][lane], kept.n[1][lane], kept.n[2][lane])); // in its frame
-        return open != 0 ? s_.slabs_of({s_.a.tree, other, of_other}, {s_.b.tree, node, own}, s_.b_to_a.rotation * n)
-                         : s_.slabs_of({s_.a.tree, node, own}, {s_.b.tree, other, of_other}, n);
+            glm::normalize(glm::dvec3(kept.n[0][lane], kept.n[1][lane], kept.n[2][lane])); // in the opened one's frame
+        return s_.slabs_of(a, b, open != 0 ? s_.b_to_a.rotation * n : n);
     }
 
     Verdict stopped() const { return s_.out_of_tests ? Verdict::undecided : Verdict::overlapping; }
@@ -150,8 +162,8 @@ private:
     // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
     HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t of_parent) {
-        const uint32_t other_is_leaf = of_parent & kOtherIsLeaf, in_one_plane = of_parent & kInOnePlane,
-                       inherited = of_parent & (kInOnePlane | CollideSearch::kSiftBits);
+        const uint32_t other_is_leaf = of_parent & kOtherIsLeaf;
+        const uint32_t inherited = of_parent & (kSifts ? kInOnePlane | CollideSearch::kSiftBits : kInOnePlane);
         Side& side = sides_[open];
         const std::byte* const block = side.block(first);
         ++block_tests_;
@@ -188,19 +200,14 @@ private:
             const uint32_t node = first + lane;
             if (have_hulls_ && kept.depth[lane] > kNearlySeparated && hulls_separated(open, node, other, kept, lane))
                 continue;
-            uint32_t flags =
+            const uint32_t flags =
                 (opened >> lane & 1) != 0 ? if_opened : if_other_opened | (leaves >> lane & 1) * kOtherIsLeaf;
-            if (slabs_pay() && in_one_plane == 0) {
-                const Slabs slabs = slabs_of(open, node, other, kept, lane);
-                if (slabs == Slabs::separated) continue;
-                if (slabs == Slabs::in_one_plane) flags |= kInOnePlane;
-            }
             if (kept.depth[lane] < least) least = kept.depth[lane], deepest = size_;
             stack_[size_++] = {open != 0 ? other : node, open != 0 ? node : other, kept.depth[lane], flags};
         }
         if (deepest < size_) std::swap(stack_[deepest], stack_[size_ - 1]);
-        if (s_.sift != nullptr)
-            size_ = static_cast<uint32_t>(s_.sift(s_.sift_user, stack_ + before, stack_ + size_) - stack_);
+        if (slabs_pay() && (of_parent & kInOnePlane) == 0) sift_by_slabs(before, open, kept);
+        if (kSifts) size_ = static_cast<uint32_t>(s_.sift(s_.sift_user, stack_ + before, stack_ + size_) - stack_);
         return false;
     }
 
@@ -215,7 +222,7 @@ private:
                 if (kept.depth[next] < kept.depth[lane]) lane = next;
             }
             lanes &= ~(1u << lane);
-            if (s_.sift != nullptr) {
+            if (kSifts) {
                 QueryContext::Entry e{open != 0 ? other : first + lane, open != 0 ? first + lane : other, 0, flags};
                 if (s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
             }
@@ -255,8 +262,9 @@ private:
 };
 
 Verdict traverse_target(CollideSearch& search) {
-    return search.options.margin + search.skin > 0 ? CollideTraversal<true>(search).run()
-                                                   : CollideTraversal<false>(search).run();
+    if (search.sift != nullptr) return CollideTraversal<true, true>(search).run();
+    return search.options.margin + search.skin > 0 ? CollideTraversal<true, false>(search).run()
+                                                   : CollideTraversal<false, false>(search).run();
 }
 
 } // namespace

@@ -20,12 +20,6 @@ using glm::dvec3;
 constexpr double kFlat = 0x1p-11;
 constexpr double kParallel = 1 - 1e-6; // cosine
 
-NodeWithHull with_hull(const TreeView& tree, uint32_t node) {
-    const ChildRange children = tree.children(node);
-    return {tree, node,
-            tree.has_triangles() && children.count > 0 ? tree.raw().hull(children.first / kBlockLanes) : nullptr};
-}
-
 // In its tree's frame; 0 if it is not flat.
 dvec3 normal_of(const NodeWithHull& at) {
     if (!at.tree.has_triangles()) return dvec3(0);

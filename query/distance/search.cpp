@@ -311,17 +311,13 @@ private:
 
 // A bound on the distance of the roots if both have slabs, which are parallel; else 0.
 double roots_by_slabs(const DistanceSearch& search) {
-    const auto root = [](const TreeSide& side) {
-        const bool inner = side.has_slabs && !side.tree.is_leaf(0);
-        return NodeWithHull{side.tree, 0, inner ? hull_of(side.hulls, side.block(0), 0) : nullptr};
-    };
-    const NodeWithHull a = root(search.a), b = root(search.b);
-    if (a.hull == nullptr || b.hull == nullptr || !may_tell(a, b, search.b_to_a, glm::dvec3(0))) return 0;
+    const NodeWithHull a = with_hull(search.a.tree, 0), b = with_hull(search.b.tree, 0);
+    if (!is_flat(a) || !is_flat(b) || !may_tell(a, b, search.b_to_a, glm::dvec3(0))) return 0;
     return search.slabs_apart(a, b);
 }
 
 void traverse_target(DistanceSearch& search) {
-    const double by_slabs = roots_by_slabs(search);
+    const double by_slabs = search.a.has_slabs && search.b.has_slabs ? roots_by_slabs(search) : 0;
     if (by_slabs > 0)
         DistanceTraversal<true>(search, by_slabs).run();
     else

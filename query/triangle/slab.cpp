@@ -9,14 +9,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace prolate::query {
 namespace {
 
 using glm::dvec3;
 
-constexpr double kAboutTheSame = 0.95; // cosine
-constexpr double kNothing = 0x1p-50;   // of a direction of length 1: what it costs is within kSeparationMargin S
+constexpr double kAboutTheSame = 0.95;  // cosine
+constexpr double kAboutParallel = 0.98; // cosine of normals that are rounded to 127ths
+constexpr double kOff = 0.008;          // which may lead astray by this share of a length
+constexpr double kNothing = 0x1p-50;    // of a direction of length 1: what it costs is within kSeparationMargin S
 
 dvec3 vector(const double (&v)[3]) {
     return {v[0], v[1], v[2]};
@@ -29,7 +32,7 @@ struct Reaching {
     dvec3 normal{0}, point{0};
     double low = 0, high = 0; // along the normal
 
-    explicit Reaching(const NodeWithHull& node) : at(node), flat(node.hull != nullptr && has_slab(node.hull)) {
+    explicit Reaching(const NodeWithHull& node) : at(node), flat(is_flat(node)) {
         if (!flat) return;
         const Slab slab = slab_of(node.tree, node.hull);
         normal = vector(slab.normal), point = vector(slab.origin);
@@ -66,10 +69,39 @@ dvec3 about_normal(const NodeWithHull& at) {
 
 } // namespace
 
+NodeWithHull with_hull(const TreeView& tree, uint32_t node) noexcept {
+    const ChildRange children = tree.children(node);
+    return {tree, node,
+            tree.has_triangles() && children.count > 0 ? tree.raw().hull(children.first / kBlockLanes) : nullptr};
+}
+
+bool is_flat(const NodeWithHull& at) noexcept {
+    return at.hull != nullptr && has_slab(at.hull);
+}
+
 bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, const dvec3& n) noexcept {
     const dvec3 of_a = about_normal(a), of_b = b_to_a.rotation * about_normal(b);
     const auto about_the_same = [](const dvec3& x, const dvec3& y) { return std::abs(glm::dot(x, y)) > kAboutTheSame; };
     return about_the_same(of_a, n) || about_the_same(of_b, n) || about_the_same(of_a, of_b);
+}
+
+bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double least) noexcept {
+    const dvec3 n = about_normal(a), of_b = b_to_a.rotation * about_normal(b);
+    const double cosine = glm::dot(n, of_b);
+    if (!(std::abs(cosine) > kAboutParallel)) return false;
+    const auto corner = [](const NodeWithHull& at) {
+        return to_double(at.tree.vertex(at.tree.triangle(load_le<uint32_t>(at.hull + kHullPlane))[0]));
+    };
+    const auto heights = [](const NodeWithHull& at) {
+        return std::pair(double{load_le<float>(at.hull + kHullLow)}, double{load_le<float>(at.hull + kHullHigh)});
+    };
+    const dvec3 between = b_to_a.rotation * corner(b) + b_to_a.translation - corner(a);
+    const double height = glm::dot(n, between);
+    const auto [low_a, high_a] = heights(a);
+    const auto [low_b, high_b] = heights(b);
+    const double gap = cosine > 0 ? std::max(height + low_b - high_a, low_a - (height + high_b))
+                                  : std::max(height - high_b - high_a, low_a - (height - low_b));
+    return gap > least - kOff * glm::length(between);
 }
 
 double gap_along(const dvec3& n, const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a) noexcept {

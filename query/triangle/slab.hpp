@@ -31,9 +31,17 @@ struct NodeWithHull {
     const std::byte* hull; ///< null of a leaf, and of a tree without triangles
 };
 
+NodeWithHull with_hull(const TreeView& tree, uint32_t node) noexcept;
+/// Does it have a slab?
+bool is_flat(const NodeWithHull& at) noexcept;
+
 /// Is a slab of theirs about perpendicular to n, which is of length 1 and in A's frame, or are they parallel to each
 /// other? Else they will not tell anything that is not known.
 bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, const glm::dvec3& n) noexcept;
+
+/// Of two nodes that have slabs: are these about parallel, and perhaps farther apart than `least`? Quick, and wrong now
+/// and then: by normals that are rounded.
+bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double least) noexcept;
 
 /// How far the second node's triangles lie beyond the first's along n, of length 1 and in A's frame; not more, and
 /// little less, if a slab of theirs is perpendicular to n, but for rounding.
