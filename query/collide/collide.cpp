@@ -11,15 +11,12 @@
 
 namespace prolate {
 
-Verdict query::decide(CollideSearch& search) noexcept {
-    Verdict verdict = traverse(search);
-    if (search.found > 0) verdict = Verdict::overlapping;
-    search.stats.deepest_level = std::max(search.a.deepest_level(), search.b.deepest_level());
-    if (verdict != Verdict::separated || !search.roots_meet) return verdict;
-    return look_inside(search.a.tree, search.b.tree, search.b_to_a, search.stats, search.options.max_pair_tests);
-}
-
 namespace {
+
+// A lower bound on the distance of the bodies, by the slabs of their roots, where both have any.
+double gap_of_flat_roots(const TreeView& a, const TreeView& b, const query::RelativePose& b_to_a, double margin) {
+    return a.raw().has_slabs() && b.raw().has_slabs() ? query::gap_of_roots(a, b, b_to_a, margin) : -HUGE_VAL;
+}
 
 // ---- coherence ----
 
@@ -67,6 +64,19 @@ bool usable(const PairCache* cache, const TreeView& a, const TreeView& b, const 
 
 } // namespace
 
+Verdict query::decide(CollideSearch& search) noexcept {
+    if (search.all && search.options.max_pair_tests > 0 && // collide() has looked before
+        gap_of_flat_roots(search.a.tree, search.b.tree, search.b_to_a, search.options.margin) > search.options.margin) {
+        search.stats.pair_tests = 1;
+        return Verdict::separated;
+    }
+    Verdict verdict = traverse(search);
+    if (search.found > 0) verdict = Verdict::overlapping;
+    search.stats.deepest_level = std::max(search.a.deepest_level(), search.b.deepest_level());
+    if (verdict != Verdict::separated || !search.roots_meet) return verdict;
+    return look_inside(search.a.tree, search.b.tree, search.b_to_a, search.stats, search.options.max_pair_tests);
+}
+
 CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                              std::span<MeetingPair> pairs, QueryContext& context,
                              const QueryOptions& options) noexcept {
@@ -106,8 +116,8 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
 
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
     const query::RelativePose b_to_a = query::relative_pose(bodies.place_a, bodies.place_b);
-    const double gap =
-        gap_of_spheres(bodies.a, bodies.b, b_to_a); // settles most pairs of a scene, at a fifth of the cost
+    double gap = gap_of_spheres(bodies.a, bodies.b, b_to_a); // settles most pairs of a scene, at a fifth of the cost
+    if (!(gap > options.margin)) gap = gap_of_flat_roots(bodies.a, bodies.b, b_to_a, double{options.margin});
     if (gap > options.margin && options.max_pair_tests > 0) {
         if (cache) remember(Verdict::separated, {}, gap);
         return {.verdict = Verdict::separated, .pair = {}, .stats = {.pair_tests = 1}};

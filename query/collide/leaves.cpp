@@ -70,13 +70,6 @@ Slabs CollideSearch::slabs_of(const NodeWithHull& node_a, const NodeWithHull& no
     return in_one_plane ? Slabs::in_one_plane : Slabs::say_nothing;
 }
 
-bool CollideSearch::slabs_separate_roots() noexcept {
-    const NodeWithHull root_a = with_hull(a.tree, 0), root_b = with_hull(b.tree, 0);
-    const double least = double{options.margin} + skin;
-    return is_flat(root_a) && is_flat(root_b) && face_each_other(root_a, root_b, b_to_a, least) &&
-           gap_of_slabs(root_a, root_b, b_to_a, reach_of_triangles()) > least;
-}
-
 // Are the triangles farther apart than margin + skin along this direction?
 bool CollideSearch::separated_along(const glm::dvec3& normal, TriangleRange in_a, TriangleRange in_b) noexcept {
     const glm::dvec3 n = normal / glm::length(normal);

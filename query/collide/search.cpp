@@ -65,7 +65,6 @@ private:
         // The roots, as if B's were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         pair_tests_ = 1;
-        if (s_.a.has_slabs && s_.b.has_slabs && s_.slabs_separate_roots()) return Verdict::separated;
         if (test_all(kOpenB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
         while (size_ > 0) {
             auto e = stack_[--size_];

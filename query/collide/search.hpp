@@ -58,8 +58,6 @@ struct CollideSearch {
     /// What slabs say of the triangles below two nodes. n is of length 1 but for rounding, in A's frame, and nearly
     /// separates them.
     Slabs slabs_of(const NodeWithHull& node_a, const NodeWithHull& node_b, const glm::dvec3& n) noexcept;
-    /// Are the roots farther apart than margin + skin by their slabs, if these face each other?
-    bool slabs_separate_roots() noexcept;
     /// Takes a pair that meets. True to stop the query.
     bool take(const MeetingPair& pair) noexcept;
     /// Does this one pair meet? It must name leaves of these trees, and their triangles where they have any. False

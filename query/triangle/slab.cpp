@@ -67,25 +67,8 @@ dvec3 about_normal(const NodeWithHull& at) {
     return dvec3(component(0), component(1), component(2)) / kHullUnit;
 }
 
-} // namespace
-
-NodeWithHull with_hull(const TreeView& tree, uint32_t node) noexcept {
-    const ChildRange children = tree.children(node);
-    return {tree, node,
-            tree.has_triangles() && children.count > 0 ? tree.raw().hull(children.first / kBlockLanes) : nullptr};
-}
-
-bool is_flat(const NodeWithHull& at) noexcept {
-    return at.hull != nullptr && has_slab(at.hull);
-}
-
-bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, const dvec3& n) noexcept {
-    const dvec3 of_a = about_normal(a), of_b = b_to_a.rotation * about_normal(b);
-    const auto about_the_same = [](const dvec3& x, const dvec3& y) { return std::abs(glm::dot(x, y)) > kAboutTheSame; };
-    return about_the_same(of_a, n) || about_the_same(of_b, n) || about_the_same(of_a, of_b);
-}
-
-bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double least) noexcept {
+// Of two nodes that have slabs: are these about parallel, and perhaps farther apart than `least`? Wrong now and then.
+bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double least) {
     const dvec3 n = about_normal(a), of_b = b_to_a.rotation * about_normal(b);
     const double cosine = glm::dot(n, of_b);
     if (!(std::abs(cosine) > kAboutParallel)) return false;
@@ -104,6 +87,24 @@ bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const Relativ
     return gap > least - kOff * glm::length(between);
 }
 
+} // namespace
+
+NodeWithHull with_hull(const TreeView& tree, uint32_t node) noexcept {
+    const ChildRange children = tree.children(node);
+    return {tree, node,
+            tree.has_triangles() && children.count > 0 ? tree.raw().hull(children.first / kBlockLanes) : nullptr};
+}
+
+bool is_flat(const NodeWithHull& at) noexcept {
+    return at.hull != nullptr && has_slab(at.hull);
+}
+
+bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, const dvec3& n) noexcept {
+    const dvec3 of_a = about_normal(a), of_b = b_to_a.rotation * about_normal(b);
+    const auto about_the_same = [](const dvec3& x, const dvec3& y) { return std::abs(glm::dot(x, y)) > kAboutTheSame; };
+    return about_the_same(of_a, n) || about_the_same(of_b, n) || about_the_same(of_a, of_b);
+}
+
 double gap_along(const dvec3& n, const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a) noexcept {
     return gap_along(n, Reaching(a), Reaching(b), b_to_a);
 }
@@ -119,6 +120,12 @@ double gap_of_slabs(const NodeWithHull& a, const NodeWithHull& b, const Relative
     if (in_a.flat) gap = std::max(gap, gap_of(in_a.normal));
     if (in_b.flat && !(gap > 0)) gap = std::max(gap, gap_of(b_to_a.rotation * in_b.normal));
     return (gap - kSeparationMargin * reach) * (1 - 0x1p-49);
+}
+
+double gap_of_roots(const TreeView& a, const TreeView& b, const RelativePose& b_to_a, double least) noexcept {
+    const NodeWithHull root_a = with_hull(a, 0), root_b = with_hull(b, 0);
+    if (!is_flat(root_a) || !is_flat(root_b) || !face_each_other(root_a, root_b, b_to_a, least)) return -HUGE_VAL;
+    return gap_of_slabs(root_a, root_b, b_to_a, triangle_reach(a) + triangle_reach(b) + b_to_a.distance);
 }
 
 } // namespace prolate::query

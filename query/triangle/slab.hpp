@@ -39,10 +39,6 @@ bool is_flat(const NodeWithHull& at) noexcept;
 /// other? Else they will not tell anything that is not known.
 bool may_tell(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, const glm::dvec3& n) noexcept;
 
-/// Of two nodes that have slabs: are these about parallel, and perhaps farther apart than `least`? Quick, and wrong now
-/// and then: by normals that are rounded.
-bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double least) noexcept;
-
 /// How far the second node's triangles lie beyond the first's along n, of length 1 and in A's frame; not more, and
 /// little less, if a slab of theirs is perpendicular to n, but for rounding.
 double gap_along(const glm::dvec3& n, const NodeWithHull& a, const NodeWithHull& b,
@@ -51,5 +47,9 @@ double gap_along(const glm::dvec3& n, const NodeWithHull& a, const NodeWithHull&
 /// A lower bound on the distance of what lies below the nodes, from their slabs; without any, or if they do not
 /// separate, not positive or NaN. `reach` is S: triangle_reach() of both trees, and b_to_a.distance.
 double gap_of_slabs(const NodeWithHull& a, const NodeWithHull& b, const RelativePose& b_to_a, double reach) noexcept;
+
+/// The same of two whole trees if both have slabs, which face each other, and may well be farther apart than `least`;
+/// else -infinity. Quick where they do not: it looks at rounded normals first.
+double gap_of_roots(const TreeView& a, const TreeView& b, const RelativePose& b_to_a, double least) noexcept;
 
 } // namespace prolate::query
