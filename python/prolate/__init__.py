@@ -6,23 +6,14 @@
 """
 
 from . import pairs
+from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, Sweeps, Verdict
 from ._bake import bake, bake_mesh
 from ._bake_many import Asset, BakeResult, bake_many
 from ._errors import Error
+from ._info import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
 from ._mesh import Mesh, load_mesh
 from ._primitives import box_tree, convex_tree, cylinder_tree, ellipsoid_tree, sphere_tree
 from ._queries import (
-    Bounds,
-    Box,
-    Capsule,
-    Contacts,
-    Distances,
-    HalfSpace,
-    Hits,
-    SignedDistances,
-    Sphere,
-    Sweeps,
-    Verdict,
     bounds,
     collide,
     contacts,
@@ -33,7 +24,8 @@ from ._queries import (
     signed_distance,
     sweep,
 )
-from ._tree import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, Tree, TreeInfo, load
+from ._shapes import Box, Capsule, HalfSpace, Sphere
+from ._tree import Tree, load
 from ._world import World, WorldPairs, WorldVerdicts
 
 __version__ = "0.1.0"

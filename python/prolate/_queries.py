@@ -2,181 +2,20 @@
 
 from __future__ import annotations
 
-import enum
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Union
+from typing import TYPE_CHECKING, Any
 
 from . import _core
+from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, Sweeps, Verdict
+from ._poses import IDENTITY, Order, is_wxyz
+from ._shapes import HalfSpace, Shape, ground, numbers
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from ._answers import Verdicts
     from ._tree import Tree
 
-    Floats = NDArray[np.float64]
-    Verdicts = NDArray[np.uint8]
-
-Order = Literal["xyzw", "wxyz"]
-
-
-class Verdict(enum.IntEnum):
-    """What a query certifies; arrays of verdicts hold these numbers as ``uint8``.
-
-    ``SEPARATED``: the solids do not touch, proved. ``OVERLAPPING``: the covers, or of exact trees the solids, have a
-    common point, or are so close that rounding hides the gap. ``UNDECIDED``: the budget ran out first.
-    """
-
-    SEPARATED = 0
-    OVERLAPPING = 1
-    UNDECIDED = 2
-
-
 _VERDICTS = tuple(Verdict)
-
-
-def _is_wxyz(order: Order) -> bool:
-    if order == "xyzw":
-        return False
-    if order == "wxyz":
-        return True
-    raise ValueError(f'order: must be "xyzw" or "wxyz", not {order!r}')
-
-
-class Distances(NamedTuple):
-    """Distances of N pairs of bodies. Lengths in metres, points in the world; scalars and ``(3,)`` for single poses.
-
-    Attributes
-    ----------
-    lower, upper : float64 (N,)
-        Certified: ``lower <= distance <= upper``. Both are 0 (but for rounding) where the bodies meet; ``upper`` is
-        infinite where the limits ended the search before it reached a pair of leaves.
-    point_a, point_b : float64 (N, 3)
-        Points of the two bodies, ``upper`` apart. NaN where there are none.
-    normal : float64 (N, 3)
-        Unit vector from ``point_a`` to ``point_b``; 0 if they coincide.
-    verdict : uint8 (N,)
-        :class:`Verdict`, that of :func:`collide`.
-    """
-
-    lower: Floats
-    upper: Floats
-    point_a: Floats
-    point_b: Floats
-    normal: Floats
-    verdict: Verdicts
-
-
-class Contacts(NamedTuple):
-    """Contact points of N pairs of bodies, ragged: those of pair ``i`` are rows ``offsets[i]:offsets[i + 1]``.
-
-    Attributes
-    ----------
-    offsets : int64 (N + 1,)
-    point_a, point_b : float64 (M, 3)
-        On the surfaces of the two bodies, opposite each other along the normal; world, metres.
-    normal : float64 (M, 3)
-        Unit vector: moving ``b`` along it takes it out of ``a``.
-    depth : float64 (M,)
-        Penetration along the normal, metres; below 0, the bodies are ``-depth`` apart there, at most the margin.
-    manifold : int64 (M,)
-        Points of a pair with the same number share their normal; the deepest manifold is 0.
-    id : uint64 (M,)
-        Names the features that touch. The same from call to call as long as these touch.
-    verdict : uint8 (N,)
-        :class:`Verdict`. A pair that overlaps without points has one body inside the other.
-    """
-
-    offsets: NDArray[np.int64]
-    point_a: Floats
-    point_b: Floats
-    normal: Floats
-    depth: Floats
-    manifold: NDArray[np.int64]
-    id: NDArray[np.uint64]
-    verdict: Verdicts
-
-
-class Sweeps(NamedTuple):
-    """First contacts of N pairs of moving bodies; scalars and ``(3,)`` for single poses.
-
-    Attributes
-    ----------
-    toi : float64 (N,)
-        Certified: at all times before it the bodies are farther apart than the margin. 0 is the start, 1 the end, and
-        1 where they never come that near.
-    time_upper : float64 (N,)
-        A time at which they are within margin and tolerance; infinite if none is known.
-    point_a, point_b, normal : float64 (N, 3)
-        As of :class:`Distances`, at ``time_upper``; NaN where there are none.
-    distance : float64 (N,)
-        Upper bound of the distance at ``time_upper``, metres.
-    verdict : uint8 (N,)
-        :class:`Verdict` of the whole motion.
-    """
-
-    toi: Floats
-    time_upper: Floats
-    point_a: Floats
-    point_b: Floats
-    normal: Floats
-    distance: Floats
-    verdict: Verdicts
-
-
-class Hits(NamedTuple):
-    """Where N rays first meet a body; scalars and ``(3,)`` for a single ray.
-
-    Attributes
-    ----------
-    t : float64 (N,)
-        The hit is at ``origin + t * direction``; infinite if there is none.
-    point, normal : float64 (N, 3)
-        The hit and the outward unit normal there, world; NaN if there is none.
-    node, triangle : int64 (N,)
-        The leaf that was hit and, of an exact tree, its triangle; -1 if there is none.
-    verdict : uint8 (N,)
-        :class:`Verdict`, the ray in the place of the second body.
-    """
-
-    t: Floats
-    point: Floats
-    normal: Floats
-    node: NDArray[np.int64]
-    triangle: NDArray[np.int64]
-    verdict: Verdicts
-
-
-class SignedDistances(NamedTuple):
-    """Signed distances of N points from the surface of a body; scalars and ``(3,)`` for a single point.
-
-    Attributes
-    ----------
-    lower, upper : float64 (N,)
-        Certified bounds, metres; above 0 outside, below 0 inside.
-    point : float64 (N, 3)
-        The nearest point of the surface, world; NaN if none was reached.
-    gradient : float64 (N, 3)
-        Unit vector along which the signed distance grows fastest; at the surface, its normal.
-    node, triangle : int64 (N,)
-        The leaf that ``point`` lies on and, of an exact tree, the triangle; -1 if there is none.
-    verdict : uint8 (N,)
-        :class:`Verdict`: ``SEPARATED`` is outside, certainly; ``OVERLAPPING`` inside, or as near as rounding.
-    """
-
-    lower: Floats
-    upper: Floats
-    point: Floats
-    gradient: Floats
-    node: NDArray[np.int64]
-    triangle: NDArray[np.int64]
-    verdict: Verdicts
-
-
-class Bounds(NamedTuple):
-    """Axis-aligned boxes of N placed bodies, ``lower`` and ``upper`` ``(N, 3)``, world, metres."""
-
-    lower: Floats
-    upper: Floats
 
 
 def collide(
@@ -234,7 +73,7 @@ def collide(
     Thread-safe; other Python threads run meanwhile. Ctrl-C ends it.
     """
     found = _core.collide(
-        a, poses_a, b, poses_b, margin, max_level, budget, threads, out, order != "xyzw" and _is_wxyz(order)
+        a, poses_a, b, poses_b, margin, max_level, budget, threads, out, order != "xyzw" and is_wxyz(order)
     )
     return _VERDICTS[found] if found.__class__ is int else found
 
@@ -277,13 +116,13 @@ def distance(
         As :func:`collide`.
     """
     if isinstance(b, HalfSpace):
-        ground = _ground(b, poses_b)
+        plane = ground(b, poses_b)
         arrays, single = _core.ground_distance(
-            a, poses_a, ground, tolerance, max_distance, budget, threads, _is_wxyz(order)
+            a, poses_a, plane, tolerance, max_distance, budget, threads, is_wxyz(order)
         )
         return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
     arrays, single = _core.distance(
-        a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, _is_wxyz(order)
+        a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, is_wxyz(order)
     )
     return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
 
@@ -320,10 +159,10 @@ def contacts(
         As :func:`collide`.
     """
     if isinstance(b, HalfSpace):
-        ground = _ground(b, poses_b)
-        arrays, verdict = _core.ground_contacts(a, poses_a, ground, margin, max_level, budget, threads, _is_wxyz(order))
+        plane = ground(b, poses_b)
+        arrays, verdict = _core.ground_contacts(a, poses_a, plane, margin, max_level, budget, threads, is_wxyz(order))
         return Contacts(*arrays, verdict)
-    arrays, verdict = _core.contacts(a, poses_a, b, poses_b, margin, max_level, budget, threads, _is_wxyz(order))
+    arrays, verdict = _core.contacts(a, poses_a, b, poses_b, margin, max_level, budget, threads, is_wxyz(order))
     return Contacts(*arrays, verdict)
 
 
@@ -366,7 +205,7 @@ def sweep(
         As :func:`collide`.
     """
     arrays, gap, single = _core.sweep(
-        a, start_a, end_a, b, start_b, end_b, margin, tolerance, max_level, budget, threads, _is_wxyz(order)
+        a, start_a, end_a, b, start_b, end_b, margin, tolerance, max_level, budget, threads, is_wxyz(order)
     )
     lower, upper, point_a, point_b, normal, verdict = arrays
     fields = (lower, upper, point_a, point_b, normal, gap, verdict)
@@ -413,92 +252,9 @@ def raycast(
         As :func:`collide`.
     """
     arrays, single = _core.raycast(
-        tree, pose, origins, directions, radius, max_t, max_level, budget, threads, _is_wxyz(order)
+        tree, pose, origins, directions, radius, max_t, max_level, budget, threads, is_wxyz(order)
     )
     return Hits(*(x[0] for x in arrays)) if single else Hits(*arrays)
-
-
-class Sphere(NamedTuple):
-    """All points at most ``radius`` from ``center`` (3,); world, metres."""
-
-    center: ArrayLike
-    radius: float
-
-
-class Capsule(NamedTuple):
-    """All points at most ``radius`` from the segment between ``a`` and ``b`` (3,); world, metres."""
-
-    a: ArrayLike
-    b: ArrayLike
-    radius: float
-
-
-class Box(NamedTuple):
-    """The box of half extents ``half`` (3,) at ``pose`` (7,), ``x y z qx qy qz qw``; world, metres."""
-
-    pose: ArrayLike
-    half: ArrayLike
-
-
-class HalfSpace(NamedTuple):
-    """All points p with ``dot(normal, p) <= offset * |normal|``; ``normal`` (3,) is no zero vector; world, metres."""
-
-    normal: ArrayLike
-    offset: float
-
-
-Shape = Union[Sphere, Capsule, Box, HalfSpace]
-
-
-def _row(name: str, value: ArrayLike, count: int) -> Floats:
-    import numpy as np
-
-    try:
-        row = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: cannot be taken as an array of float64") from None
-    if row.shape != (count,):
-        raise ValueError(f"{name}: must have shape ({count},), not {row.shape}")
-    return row
-
-
-def _length(name: str, value: float) -> Floats:
-    row = _row(name, [value], 1)
-    if row[0] < 0:
-        raise ValueError(f"{name}: must be 0 or more")
-    return row
-
-
-def _numbers(shape: Shape) -> tuple[str, Floats]:
-    import numpy as np
-
-    if isinstance(shape, Sphere):
-        return "sphere", np.concatenate([_row("shape.center", shape.center, 3), _length("shape.radius", shape.radius)])
-    if isinstance(shape, Capsule):
-        ends = [_row("shape.a", shape.a, 3), _row("shape.b", shape.b, 3)]
-        return "capsule", np.concatenate([*ends, _length("shape.radius", shape.radius)])
-    if isinstance(shape, Box):
-        half = _row("shape.half", shape.half, 3)
-        pose = _row("shape.pose", shape.pose, 7)
-        if (half < 0).any():
-            raise ValueError("shape.half: must be 0 or more")
-        if not np.abs(pose[3:]).max() > 1e-18:
-            raise ValueError("shape.pose: has a quaternion of 0; no rotation is 0 0 0 1")
-        return "box", np.concatenate([pose, half])
-    if isinstance(shape, HalfSpace):
-        normal = _row("shape.normal", shape.normal, 3)
-        length = float(np.linalg.norm(normal))
-        if not 0 < length < np.inf:
-            raise ValueError("shape.normal: must not be 0")
-        offset = _row("shape.offset", [shape.offset], 1)
-        return "half_space", np.concatenate([normal / length, offset])
-    raise TypeError(f"shape: must be a Sphere, Capsule, Box or HalfSpace, not {type(shape).__name__}")
-
-
-def _ground(half_space: HalfSpace, pose: object) -> Floats:
-    if pose is not None:
-        raise TypeError("poses_b: a HalfSpace is in the world and has no pose")
-    return _numbers(half_space)[1]
 
 
 def overlap(
@@ -531,13 +287,9 @@ def overlap(
     ValueError, TypeError
         As :func:`collide`.
     """
-    kind, numbers = _numbers(shape)
-    found = _core.overlap(tree, poses, kind, numbers, margin, max_level, budget, threads, out, _is_wxyz(order))
+    kind, row = numbers(shape)
+    found = _core.overlap(tree, poses, kind, row, margin, max_level, budget, threads, out, is_wxyz(order))
     return _VERDICTS[found] if isinstance(found, int) else found
-
-
-_IDENTITY = (0, 0, 0, 0, 0, 0, 1)
-_IDENTITY_WXYZ = (0, 0, 0, 1, 0, 0, 0)
 
 
 def signed_distance(
@@ -575,8 +327,8 @@ def signed_distance(
     ValueError, TypeError
         As :func:`collide`.
     """
-    wxyz = _is_wxyz(order)
-    at = (_IDENTITY_WXYZ if wxyz else _IDENTITY) if pose is None else pose
+    wxyz = is_wxyz(order)
+    at = IDENTITY[order] if pose is None else pose
     arrays, single = _core.signed_distance(tree, points, at, max_distance, budget, threads, wxyz)
     return SignedDistances(*(x[0] for x in arrays)) if single else SignedDistances(*arrays)
 
@@ -596,8 +348,8 @@ def contains(
     uint8 array of shape (N,), or a Verdict for a single point
         ``SEPARATED``: outside, certainly.
     """
-    wxyz = _is_wxyz(order)
-    at = (_IDENTITY_WXYZ if wxyz else _IDENTITY) if pose is None else pose
+    wxyz = is_wxyz(order)
+    at = IDENTITY[order] if pose is None else pose
     found = _core.contains(tree, points, at, threads, wxyz)
     return _VERDICTS[found] if isinstance(found, int) else found
 
@@ -615,5 +367,5 @@ def bounds(tree: Tree, poses: ArrayLike, *, margin: float = 0, order: Order = "x
     Bounds
         Certified, and at most 1 or 2 % longer than the smallest along each axis.
     """
-    lower, upper, single = _core.bounds(tree, poses, margin, _is_wxyz(order))
+    lower, upper, single = _core.bounds(tree, poses, margin, is_wxyz(order))
     return Bounds(lower[0], upper[0]) if single else Bounds(lower, upper)

@@ -37,7 +37,7 @@ HalfSpace half_space_in_frame(const HeldTree& held, const DoublePose& body, std:
     return {local_normal, local_offset};
 }
 
-// The shapes of python/prolate/_queries.py, as their numbers in the world. Each is taken into the body's frame.
+// The shapes of python/prolate/_shapes.py, as their numbers in the world. Each is taken into the body's frame.
 class Shape {
 public:
     Shape(char kind, std::span<const double> numbers) : kind_(kind), n_(numbers) {}
