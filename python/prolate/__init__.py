@@ -7,10 +7,10 @@
 
 from . import pairs
 from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, Sweeps, Verdict
-from ._bake import bake, bake_mesh
+from ._bake import BallRange, bake, bake_mesh, ball_range, least_clearance
 from ._bake_many import Asset, BakeResult, bake_many
 from ._errors import Error
-from ._info import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
+from ._info import Asked, Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
 from ._mesh import Mesh, load_mesh
 from ._primitives import box_tree, convex_tree, cylinder_tree, ellipsoid_tree, sphere_tree
 from ._queries import (
@@ -31,8 +31,10 @@ from ._world import World, WorldPairs, WorldVerdicts
 __version__ = "0.1.0"
 
 __all__ = [
+    "Asked",
     "Asset",
     "BakeResult",
+    "BallRange",
     "Bounds",
     "Box",
     "Capsule",
@@ -61,6 +63,7 @@ __all__ = [
     "bake",
     "bake_many",
     "bake_mesh",
+    "ball_range",
     "bounds",
     "box_tree",
     "collide",
@@ -70,6 +73,7 @@ __all__ = [
     "cylinder_tree",
     "distance",
     "ellipsoid_tree",
+    "least_clearance",
     "load",
     "load_mesh",
     "overlap",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Union
 
 from . import _core
-from ._mesh import Mesh, Placement, arrays_of, factors, metres, placed
+from ._mesh import Mesh, Placement, arrays_of, factors, length, metres, placed
 from ._tree import Progress, Tree, baked_tree
 
 if TYPE_CHECKING:
@@ -20,6 +20,9 @@ def bake(
     ellipsoids: int | None = None,
     tolerance: float | None = None,
     distance: float | None = None,
+    clearance: Union[str, float, None] = None,
+    keep_holes: Union[str, float, None] = None,
+    fill: Union[str, float, None] = None,
     exact: bool = False,
     primitive: Literal["ellipsoid", "sphere"] = "ellipsoid",
     quality: Literal["fast", "normal", "best"] = "normal",
@@ -38,8 +41,10 @@ def bake(
 ) -> Tree:
     """Make an ellipsoid tree of a mesh; every level is proved to cover it.
 
-    The goal is one of ``levels``, ``ellipsoids``, a closeness (``tolerance``, ``distance`` or both) and ``exact``; by
-    default 3 levels. The same mesh and options give the same bytes, for any number of threads.
+    The goal is one of ``levels``, ``ellipsoids``, a closeness (one or several of ``tolerance``, ``distance``,
+    ``clearance`` and ``keep_holes``) and ``exact``; by default 3 levels. ``ellipsoids`` together with a closeness means
+    at most that many, and fewer if they are close enough. The same mesh and options give the same bytes, for any number
+    of threads.
 
     Parameters
     ----------
@@ -50,11 +55,21 @@ def bake(
     levels : int, optional
         Levels below the root, 1 ... 31.
     ellipsoids : int, optional
-        Number of leaves, 1 ... 65536: the best set of that many, with a tree above it.
+        Number of leaves, 1 ... 65536: the best set of that many, with a tree above it. With a closeness: the most.
     tolerance : float, optional
         Largest outside volume of the leaves / volume of the solid.
     distance : float, optional
         Largest distance of the leaves from the solid, in % of the diagonal of the mesh's box.
+    clearance : float or str, optional
+        The same limit as a length: metres, or a text with its unit such as ``"5mm"`` (mm, cm, m, in, ft).
+        :func:`least_clearance` says how small it may be.
+    keep_holes : float or str, optional
+        Radius of a ball, a length like ``clearance``. It passes the leaves, proved, wherever one larger by a seventh
+        (or by 1/110 of the box's longest side) passes holes of the mesh, and between its parts. :func:`ball_range` says
+        how large it may be. Not with ``fill``.
+    fill : float or str, optional
+        Radius of a ball, a length like ``clearance``. What the ball cannot reach from outside without touching the mesh
+        counts as solid, so an open mesh has an inside, too. All figures are then about the filled solid.
     exact : bool
         Store the triangles in the leaves; queries then answer for them.
     primitive : {"ellipsoid", "sphere"}
@@ -103,7 +118,8 @@ def bake(
     """
     return bake_mesh(
         (vertices, faces),
-        levels=levels, ellipsoids=ellipsoids, tolerance=tolerance, distance=distance, exact=exact,
+        levels=levels, ellipsoids=ellipsoids, tolerance=tolerance, distance=distance, clearance=clearance,
+        keep_holes=keep_holes, fill=fill, exact=exact,
         primitive=primitive, quality=quality, method=method, degree=degree, leaf_triangles=leaf_triangles,
         alpha=alpha, beta=beta, weld=weld, seed=seed, unit=unit, scale=scale, recentre=recentre,
         threads=threads, progress=progress,
@@ -111,11 +127,12 @@ def bake(
 
 
 _OPTIONS = (
-    "levels", "ellipsoids", "tolerance", "distance", "exact", "primitive", "quality", "method", "degree",
-    "leaf_triangles", "alpha", "beta", "weld", "seed", "threads",
+    "levels", "ellipsoids", "tolerance", "distance", "clearance", "keep_holes", "fill", "exact",
+    "primitive", "quality", "method", "degree", "leaf_triangles", "alpha", "beta", "weld", "seed", "threads",
 )  # fmt: skip
 
 
+_LENGTHS = ("clearance", "keep_holes", "fill")
 _FRAME = ("unit", "scale", "recentre")
 
 
@@ -135,7 +152,8 @@ def core_options(options: dict[str, Any]) -> dict[str, object]:
     if unknown:
         raise TypeError(f"bake() got an unexpected keyword argument {min(unknown)!r}")
     given = {**defaults, **options}
-    return {**{name: given[name] for name in _OPTIONS}, "exact": bool(given["exact"])}
+    lengths = {name: length(name, given[name]) for name in _LENGTHS}
+    return {**{name: given[name] for name in _OPTIONS}, **lengths, "exact": bool(given["exact"])}
 
 
 def prepared(mesh: Any, options: dict[str, Any]) -> Prepared:
@@ -148,8 +166,8 @@ def prepared(mesh: Any, options: dict[str, Any]) -> Prepared:
                 raise ValueError(f"{name}: belongs to load_mesh(), which has read the mesh")
         return Prepared(vertices, faces, (mesh.scale, mesh.origin), core)
     x, y, z = factors(options.get("scale"))
-    length = metres(options.get("unit")) or 1.0
-    moved = placed(vertices, faces, (x * length, y * length, z * length), bool(options.get("recentre", False)))
+    step = metres(options.get("unit")) or 1.0
+    moved = placed(vertices, faces, (x * step, y * step, z * step), bool(options.get("recentre", False)))
     return Prepared(*moved, core)
 
 
@@ -171,3 +189,21 @@ def bake_mesh(mesh: Any, **options: Any) -> Tree:
     """
     ready = prepared(mesh, options)
     return baked_tree(*_core.bake(*ready, options.get("progress")))
+
+
+class BallRange(NamedTuple):
+    """The radii, metres, that ``fill`` and ``keep_holes`` may have: finer gaps cannot be told, larger balls are larger
+    than the mesh."""
+
+    least: float
+    most: float
+
+
+def least_clearance(diagonal: float, quality: Literal["fast", "normal", "best"] = "normal") -> float:
+    """The least ``clearance`` that :func:`bake` can be asked for, of a mesh whose box has this diagonal; metres."""
+    return _core.least_clearance(diagonal, quality)
+
+
+def ball_range(longest_side: float) -> BallRange:
+    """How large the balls of ``fill`` and ``keep_holes`` may be, of a mesh whose box has this longest side; metres."""
+    return BallRange(*_core.ball_range(longest_side))

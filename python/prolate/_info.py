@@ -107,6 +107,23 @@ class Diagnosis(NamedTuple):
     size: tuple[float, float, float]
 
 
+class Asked(NamedTuple):
+    """What a bake was asked for, as :func:`bake` has it; None where it was not.
+
+    ``distance`` is that or ``clearance``, whichever is less, in % of the diagonal.
+    """
+
+    levels: int | None
+    ellipsoids: int | None
+    tolerance: float | None
+    distance: float | None
+    keep_holes: float | None
+    fill: float | None
+    weld: float | None
+    alpha: float
+    beta: float
+
+
 class TreeInfo(NamedTuple):
     """What a tree says of itself.
 
@@ -121,7 +138,8 @@ class TreeInfo(NamedTuple):
     surface_mode : bool
         The mesh was open: only its triangles are certain to be covered.
     goal_reached : bool
-        False: the asked number, tolerance or distance could not be met.
+        False: the asked number or closeness could not be met; the tree comes as close as could be.
+    asked : Asked
     volume, volume_error : float
         Of the solid, by the columns that all ratios are measured with, cubic metres; 0 where there is no inside.
     mass : Mass
@@ -136,6 +154,8 @@ class TreeInfo(NamedTuple):
         The key of a cache of bakes.
     diagnosis : Diagnosis or None
         Of the mesh; known of trees that this process, or one that it was pickled by, has baked.
+    hole_radius : float or None
+        Known of the same trees, if ``keep_holes`` was asked: the radius of the ball that does pass, metres.
     """
 
     levels: tuple[LevelInfo, ...]
@@ -143,6 +163,7 @@ class TreeInfo(NamedTuple):
     proved: bool
     surface_mode: bool
     goal_reached: bool
+    asked: Asked
     volume: float
     volume_error: float
     mass: Mass
@@ -163,6 +184,7 @@ class TreeInfo(NamedTuple):
     source_hash: int
     options_hash: int
     diagnosis: Diagnosis | None
+    hole_radius: float | None
 
 
 class LevelProof(NamedTuple):
@@ -181,11 +203,14 @@ class Proof(NamedTuple):
     Attributes
     ----------
     covered : bool
-        Every level covers, and the bounding volumes hold what is below them.
+        Every level covers, the bounding volumes hold what is below them, and holes are kept.
     same_mesh : bool
         Of an exact tree: its triangles are the mesh's.
     bounded : bool
-        The bounding volumes hold what is below them.
+        The bounding volumes hold what is below them. If not, ``unbounded_node`` is the first node whose does not.
+    holes_kept : bool
+        Of a tree that was baked with ``keep_holes``: the ball passes wherever a somewhat larger one passes the mesh.
+        If not, ``blocked`` (3,) is the center of a ball that is not certainly free.
     surface_mode : bool
         The mesh is open, so the proof is about its triangles.
     levels : tuple of LevelProof
@@ -194,6 +219,9 @@ class Proof(NamedTuple):
     covered: bool
     same_mesh: bool
     bounded: bool
+    unbounded_node: int | None
+    holes_kept: bool
+    blocked: tuple[float, float, float] | None
     surface_mode: bool
     levels: tuple[LevelProof, ...]
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
+import re
 from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 from . import _core
@@ -52,6 +54,20 @@ def metres(unit: Union[str, float, None]) -> float | None:
     if not (length > 0 and math.isfinite(length)):
         raise ValueError("unit: must be above 0")
     return length
+
+
+_LENGTH = re.compile(r"\s*([^a-z\s]+(?:e[^a-z\s]+)?)\s*([a-z]+)\s*")
+
+
+def length(name: str, value: Union[str, float, None]) -> float | None:
+    """Metres of a number of metres, or of a text such as ``"5mm"``."""
+    if not isinstance(value, str):
+        return value  # which _core looks at
+    found = _LENGTH.fullmatch(value)
+    with contextlib.suppress(KeyError, ValueError):
+        if found is not None:
+            return float(found[1]) * UNITS[found[2]]
+    raise ValueError(f'{name}: must be metres, or a text such as "5mm" ({", ".join(UNITS)}); not {value!r}')
 
 
 def factors(scale: ArrayLike | None) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _core
 from ._errors import Error
-from ._info import Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
+from ._info import Asked, Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
 from ._mesh import Mesh, arrays_of, placed
 
 if TYPE_CHECKING:
@@ -25,13 +25,13 @@ class Tree(_core.Tree):
     and copied, and equals a tree of the same bytes.
     """
 
-    __slots__ = ("_diagnosis", "_hash")
-    _diagnosis: dict[str, Any] | None
+    __slots__ = ("_hash", "_report")
+    _report: dict[str, Any] | None
     _hash: int | None
 
     def __init__(self, buffer: object, check_hash: bool = True) -> None:
         super().__init__(_bytes_of(buffer), check_hash)
-        self._diagnosis = None
+        self._report = None
         self._hash = None
 
     @classmethod
@@ -75,7 +75,7 @@ class Tree(_core.Tree):
         import pickle
 
         data = pickle.PickleBuffer(self.buffer.data) if protocol >= 5 else bytes(self)
-        return _restored, (data, self._diagnosis)
+        return _restored, (data, self._report)
 
     def __copy__(self) -> Tree:
         return self
@@ -101,8 +101,16 @@ class Tree(_core.Tree):
         """What the tree says of itself: levels, closeness, volume, proof, how it was baked."""
         known = self.info_dict()
         levels = tuple(LevelInfo(**level) for level in known.pop("levels"))
-        diagnosis = None if self._diagnosis is None else Diagnosis(**self._diagnosis)
-        return TreeInfo(levels=levels, mass=Mass(**known.pop("mass")), diagnosis=diagnosis, **known)
+        report = dict(self._report or {})
+        hole_radius = report.pop("hole_radius", None)
+        return TreeInfo(
+            levels=levels,
+            mass=Mass(**known.pop("mass")),
+            asked=Asked(**known.pop("asked")),
+            diagnosis=Diagnosis(**report) if report else None,
+            hole_radius=hole_radius,
+            **known,
+        )
 
     def cut(self, level: int = -1) -> Ellipsoids:
         """The ellipsoids of a level, and of the leaves above it.
@@ -316,16 +324,16 @@ def load(path: Union[str, os.PathLike[str]], *, check_hash: bool = True) -> Tree
         raise Error(f"{error}: {name}", error.code, error.where) from None
 
 
-def baked_tree(data: object, diagnosis: dict[str, Any] | None) -> Tree:
+def baked_tree(data: object, report: dict[str, Any] | None) -> Tree:
     """The tree of bytes that were just made."""
     tree = Tree(data, check_hash=False)
-    tree._diagnosis = diagnosis
+    tree._report = report
     return tree
 
 
-def _restored(data: object, diagnosis: dict[str, Any] | None) -> Tree:
+def _restored(data: object, report: dict[str, Any] | None) -> Tree:
     tree = Tree(data)
-    tree._diagnosis = diagnosis
+    tree._report = report
     return tree
 
 

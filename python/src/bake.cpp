@@ -179,10 +179,15 @@ Enum choice(nb::handle value, const char* name, std::initializer_list<std::pair<
     value_error(name, "must be one of " + known);
 }
 
+Quality quality_of(nb::handle value) {
+    return choice<Quality>(value, "quality",
+                           {{"fast", Quality::fast}, {"normal", Quality::normal}, {"best", Quality::best}});
+}
+
 // Of the keyword arguments of prolate.bake(), which has the default values.
 BuildOptions options_of(const nb::dict& o) {
     BuildOptions out;
-    const auto closeness = [&](const char* name) {
+    const auto above_0 = [&](const char* name) { // 0: not asked
         if (o[name].is_none()) return 0.0f;
         const double value = number(o[name], name);
         if (!(value > 0)) value_error(name, "must be above 0");
@@ -191,14 +196,16 @@ BuildOptions options_of(const nb::dict& o) {
     out.degree = static_cast<uint32_t>(whole(o["degree"], "degree", 2, kMaxDegree));
     out.levels = static_cast<uint32_t>(whole_or(o["levels"], "levels", 1, kMaxLevels - 1, 0));
     out.ellipsoids = static_cast<uint32_t>(whole_or(o["ellipsoids"], "ellipsoids", 1, 65536, 0));
-    out.tolerance = closeness("tolerance");
-    out.distance = closeness("distance");
+    out.tolerance = above_0("tolerance");
+    out.distance = above_0("distance");
+    out.clearance = above_0("clearance");
+    out.keep_holes = above_0("keep_holes");
+    out.fill = above_0("fill");
     out.exact = nb::cast<bool>(o["exact"]);
     out.leaf_triangles = static_cast<uint32_t>(whole(o["leaf_triangles"], "leaf_triangles", 1, kMaxLeafTriangles));
     out.primitive = choice<Primitive>(o["primitive"], "primitive",
                                       {{"ellipsoid", Primitive::ellipsoid}, {"sphere", Primitive::sphere}});
-    out.quality = choice<Quality>(o["quality"], "quality",
-                                  {{"fast", Quality::fast}, {"normal", Quality::normal}, {"best", Quality::best}});
+    out.quality = quality_of(o["quality"]);
     out.method = choice<Method>(o["method"], "method", {{"voxel", Method::voxel}, {"analytic", Method::analytic}});
     out.alpha = static_cast<float>(number_from_0(o["alpha"], "alpha"));
     out.beta = static_cast<float>(number_from_0(o["beta"], "beta"));
@@ -242,8 +249,11 @@ nb::tuple bake(nb::handle vertices, nb::handle faces, nb::handle placement, cons
         return build(mesh.view, wanted,
                      [&](const BuildProgress& p) { return progress.report(p.stage, p.fraction, p.nodes); });
     });
+    if (!built && built.error().code == ErrorCode::bad_options) throw nb::value_error(built.error().what);
     if (!built) throw Failure{built.error(), about(built.error())};
-    return nb::make_tuple(owned_bytes(built->tree.bytes()), report_dict(built->mesh));
+    nb::dict report = report_dict(built->mesh);
+    report["hole_radius"] = wanted.keep_holes > 0 ? nb::cast(built->hole_radius) : nb::none();
+    return nb::make_tuple(owned_bytes(built->tree.bytes()), report);
 }
 
 // (source hash, options hash), the key of a cache.
@@ -266,13 +276,13 @@ nb::dict verify_tree(nb::handle tree, nb::handle vertices, nb::handle faces, nb:
                           .progress = [&](double fraction) { return progress.report("prove", fraction, 0); }};
     const auto report = progress.run(callback, [&] { return verify(held.view, mesh.view, options); });
     if (!report) throw Failure{report.error(), about(report.error())};
+    const auto point = [](const double(&p)[3]) { return nb::make_tuple(p[0], p[1], p[2]); };
     nb::list levels;
     for (const LevelProof& level : report->levels) {
         nb::dict one;
         one["covered"] = level.covered;
         one["counterexample"] = nb::none();
-        if (level.has_counterexample)
-            one["counterexample"] = nb::make_tuple(level.point[0], level.point[1], level.point[2]);
+        if (level.has_counterexample) one["counterexample"] = point(level.point);
         one["depth"] = level.depth;
         one["pieces"] = level.pieces;
         levels.append(one);
@@ -281,6 +291,10 @@ nb::dict verify_tree(nb::handle tree, nb::handle vertices, nb::handle faces, nb:
     out["covered"] = report->covered;
     out["same_mesh"] = report->same_mesh;
     out["bounded"] = report->bounded;
+    out["unbounded_node"] = report->bounded ? nb::none() : nb::cast(report->unbounded_node);
+    out["holes_kept"] = report->holes_kept;
+    out["blocked"] = nb::none();
+    if (!report->holes_kept) out["blocked"] = point(report->blocked);
     out["surface_mode"] = report->surface_mode;
     out["levels"] = nb::tuple(levels);
     return out;
@@ -341,6 +355,19 @@ void bind_bake(nb::module_& m) {
     m.def("options_hash", [](const nb::dict& options) { return hash(options_of(options)); });
     m.def("bake_key", &bake_key, nb::arg("vertices").none(), nb::arg("faces").none(), nb::arg("placement").none(),
           nb::arg("options"));
+    m.def(
+        "least_clearance",
+        [](nb::handle diagonal, nb::handle quality) {
+            return least_clearance(number_from_0(diagonal, "diagonal"), quality_of(quality));
+        },
+        nb::arg("diagonal").none(), nb::arg("quality").none());
+    m.def(
+        "ball_range",
+        [](nb::handle longest_side) {
+            const BallRange range = ball_range(number_from_0(longest_side, "longest_side"));
+            return nb::make_tuple(range.least, range.most);
+        },
+        nb::arg("longest_side").none());
     m.def("verify", &verify_tree, nb::arg("tree").none(), nb::arg("vertices").none(), nb::arg("faces").none(),
           nb::arg("placement").none(), nb::arg("threads").none(), nb::arg("progress").none());
     m.def("load_mesh", &read_mesh, nb::arg("path"), nb::arg("unit").none(), nb::arg("scale").none(),

@@ -146,6 +146,21 @@ nb::dict mass_dict(const MassProperties& m) {
     return out;
 }
 
+nb::dict asked_dict(const BakeInfo& info) { // None: not asked
+    const auto or_none = [](auto value, bool asked) -> nb::object { return asked ? nb::cast(value) : nb::none(); };
+    nb::dict out;
+    out["levels"] = or_none(info.levels, info.levels > 0);
+    out["ellipsoids"] = or_none(info.ellipsoids, info.ellipsoids > 0);
+    out["tolerance"] = or_none(info.tolerance, info.tolerance > 0);
+    out["distance"] = or_none(info.distance, info.distance > 0);
+    out["keep_holes"] = or_none(info.keep_holes, info.keep_holes > 0);
+    out["fill"] = or_none(info.fill, info.fill > 0);
+    out["weld"] = or_none(info.weld, info.weld >= 0);
+    out["alpha"] = info.alpha;
+    out["beta"] = info.beta;
+    return out;
+}
+
 nb::dict info_of(const HeldTree& held) {
     const TreeView& tree = held.view;
     const BakeInfo info = tree.bake_info();
@@ -168,6 +183,7 @@ nb::dict info_of(const HeldTree& held) {
     out["diagonal"] = info.diagonal;
     out["scale"] = three(info.placement.scale[0], info.placement.scale[1], info.placement.scale[2]);
     out["origin"] = three(info.placement.origin[0], info.placement.origin[1], info.placement.origin[2]);
+    out["asked"] = asked_dict(info);
     out["primitive"] = name_of(info.primitive);
     out["quality"] = name_of(info.quality);
     out["method"] = name_of(info.method);
