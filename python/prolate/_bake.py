@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Union
 
 from . import _core
+from ._errors import check_callable
 from ._mesh import Mesh, Placement, arrays_of, factors, length, metres, placed
 from ._tree import Progress, Tree, baked_tree
 
@@ -187,6 +188,7 @@ def bake_mesh(mesh: Any, **options: Any) -> Tree:
     Error, ValueError, TypeError
         As :func:`bake`.
     """
+    check_callable("progress", options.get("progress"))
     ready = prepared(mesh, options)
     return baked_tree(*_core.bake(*ready, options.get("progress")))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 from . import _core
 from ._bake import bake_mesh, core_options, prepared
-from ._errors import Error
+from ._errors import Error, check_callable, path_of
 from ._mesh import Mesh, arrays_of, factors, load_mesh, metres
 from ._tree import Tree, load
 
@@ -89,8 +89,14 @@ def bake_many(
     -----
     Assets of the same content and options are baked once.
     """
-    jobs = [_asset(asset) for asset in assets]
-    folder = None if cache is None else os.path.abspath(os.fsdecode(cache))
+    check_callable("progress", progress)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise TypeError(f"executor: must be a concurrent.futures.Executor, not {type(executor).__name__}")
+    try:
+        jobs = [_asset(asset) for asset in assets]
+    except TypeError as error:
+        raise TypeError(f"assets: {error}") from None
+    folder = None if cache is None else os.path.abspath(path_of("cache", cache))
     first = _first_of_its_kind(jobs)
     results: list[BakeResult | None] = [None] * len(jobs)
     done = 0
@@ -108,7 +114,7 @@ def _asset(asset: AnyAsset) -> Asset:
         return asset
     if isinstance(asset, (str, os.PathLike, Mesh)) or hasattr(asset, "vertices") or isinstance(asset, tuple):
         return Asset(asset)
-    raise TypeError(f"assets: {type(asset).__name__} is neither an Asset, a path nor a mesh")
+    raise TypeError(f"{type(asset).__name__} is neither an Asset, a path nor a mesh")
 
 
 def _first_of_its_kind(jobs: list[Asset]) -> list[int]:
@@ -124,8 +130,7 @@ def _content(job: Asset) -> object:
 
     mesh = job.mesh
     if isinstance(mesh, (str, os.PathLike)):
-        path = os.fsdecode(mesh)
-        return _core.mesh_file_hash(path, None, None, False) or path
+        return _core.mesh_file_hash(os.fsencode(mesh), None, None, False) or os.fsdecode(mesh)
     try:
         arrays = [np.asarray(array) for array in arrays_of(mesh)]
     except (TypeError, ValueError):
@@ -174,7 +179,7 @@ def _cached_or_baked(asset: Asset, folder: str | None) -> tuple[Tree, bool]:
     file_key = None
     if folder is not None:
         by = factors(frame["scale"]) if frame.get("scale") is not None else None
-        file_key = _core.mesh_file_hash(os.fsdecode(mesh), metres(frame.get("unit")), by, bool(frame.get("recentre")))
+        file_key = _core.mesh_file_hash(os.fsencode(mesh), metres(frame.get("unit")), by, bool(frame.get("recentre")))
         tree = _find(folder, _known_source(folder, file_key), _core.options_hash(core_options(options)))
         if tree is not None:
             return tree, True

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from ._errors import Error, ErrorCode
+from ._errors import Error, ErrorCode, path_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +34,9 @@ def _run(arguments: list[str]) -> bytes:
     """What the command prints; its error as an Error."""
     if not os.path.exists(_EXECUTABLE):
         raise Error("this installation was built without the command (PROLATE_BUILD_CLI)", "unsupported")
-    done = subprocess.run([_EXECUTABLE, *arguments, "--quiet"], capture_output=True, check=False)
+    done = subprocess.run(
+        [_EXECUTABLE, *arguments, "--quiet"], stdin=subprocess.DEVNULL, capture_output=True, check=False
+    )
     if done.returncode == 0:
         return done.stdout
     text = done.stderr.decode(errors="replace").strip()
@@ -53,7 +55,7 @@ def _files(tree: Tree, mesh: Any) -> Iterator[list[str]]:
         if mesh is None:
             yield [tree_path]
         elif isinstance(mesh, (str, os.PathLike)):
-            yield [tree_path, os.fsdecode(mesh)]
+            yield [tree_path, os.path.abspath(path_of("mesh", mesh))]  # "-" would be standard input
         else:
             mesh_path = os.path.join(folder, "mesh.ply")
             _write_ply(mesh_path, mesh)
@@ -81,6 +83,16 @@ def _write_ply(path: str, mesh: Any) -> None:
         file.write(header.encode())
         file.write(np.ascontiguousarray(points, dtype="<f8").tobytes())
         file.write(triangles.tobytes())
+
+
+def flags(**given: object) -> list[str]:
+    """Options as the command reads them; None and False are left out, and so it has its own defaults."""
+    out = []
+    for name, value in given.items():
+        many = ",".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
+        if value is not None and value is not False:
+            out.append("--" + name.replace("_", "-") + ("" if value is True else "=" + many))
+    return out
 
 
 def run_on(tree: Tree, word: str, more: list[str], options: list[str]) -> bytes:

@@ -53,7 +53,7 @@ def verify(
     tree: object, vertices: object, faces: object, placement: _Placement, threads: object, progress: _Progress
 ) -> dict[str, Any]: ...
 def load_mesh(
-    path: str, unit: object, scale: object, recentre: bool
+    path: bytes, unit: object, scale: object, recentre: bool
 ) -> tuple[
     NDArray[np.float32],
     NDArray[np.uint32],
@@ -61,8 +61,8 @@ def load_mesh(
     list[str],
     list[str],
 ]: ...
-def mesh_file_hash(path: str, unit: object, scale: object, recentre: bool) -> Optional[int]: ...
-def save(path: str, tree: Tree, /) -> None: ...
+def mesh_file_hash(path: bytes, unit: object, scale: object, recentre: bool) -> Optional[int]: ...
+def save(path: bytes, tree: Tree, /) -> None: ...
 def collide(
     a: object,
     poses_a: object,

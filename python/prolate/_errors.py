@@ -1,8 +1,9 @@
-"""The exception of everything that is no mistake in an argument."""
+"""The exception of everything that is no mistake in an argument, and checks of arguments that many functions have."""
 
 from __future__ import annotations
 
-from typing import Literal
+import os
+from typing import Literal, Union
 
 ErrorCode = Literal[
     "bad_options",
@@ -42,3 +43,22 @@ class Error(Exception):
 
     def __reduce__(self) -> tuple[type[Error], tuple[str, ErrorCode, int]]:
         return Error, (str(self), self.code, self.where)
+
+
+def path_of(name: str, path: Union[str, bytes, os.PathLike[str]]) -> str:
+    """The path as text that the system can take."""
+    try:
+        text = os.fsdecode(path)
+        raw = os.fsencode(text)
+    except TypeError:
+        raise TypeError(f"{name}: must be a path, not {type(path).__name__}") from None
+    except UnicodeError:
+        raise ValueError(f"{name}: cannot be a file's name in this system's encoding") from None
+    if b"\0" in raw:
+        raise ValueError(f"{name}: no path has a zero byte")
+    return text
+
+
+def check_callable(name: str, function: object) -> None:
+    if function is not None and not callable(function):
+        raise TypeError(f"{name}: must be callable, not {type(function).__name__}")

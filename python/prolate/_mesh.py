@@ -9,6 +9,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 from . import _core
+from ._errors import path_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -50,10 +51,13 @@ def metres(unit: Union[str, float, None]) -> float | None:
         if unit not in UNITS:
             raise ValueError(f"unit: must be one of {', '.join(UNITS)}, or a length in metres; not {unit!r}")
         return UNITS[unit]
-    length = float(unit)
-    if not (length > 0 and math.isfinite(length)):
+    try:
+        step = float(unit)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"unit: must be one of {', '.join(UNITS)}, or a length in metres; not {unit!r}") from None
+    if not (step > 0 and math.isfinite(step)):
         raise ValueError("unit: must be above 0")
-    return length
+    return step
 
 
 _LENGTH = re.compile(r"\s*([^a-z\s]+(?:e[^a-z\s]+)?)\s*([a-z]+)\s*")
@@ -78,7 +82,7 @@ def factors(scale: ArrayLike | None) -> tuple[float, float, float]:
         return 1.0, 1.0, 1.0
     try:
         row = np.asarray(scale, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise TypeError("scale: must be a number, or three") from None
     if row.shape not in ((), (3,)) or not np.isfinite(row).all() or (row == 0).any():
         raise ValueError("scale: must be one number or three, finite, none of them 0")
@@ -117,7 +121,7 @@ def load_mesh(
         For an option.
     """
     vertices, faces, (by, origin), notes, _ = _core.load_mesh(
-        os.fsdecode(path), metres(unit), None if scale is None else factors(scale), bool(recentre)
+        os.fsencode(path_of("path", path)), metres(unit), None if scale is None else factors(scale), bool(recentre)
     )
     return Mesh(vertices, faces, by, origin, notes)
 

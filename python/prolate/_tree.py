@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _core
-from ._errors import Error
+from ._errors import Error, check_callable, path_of
 from ._info import Asked, Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
 from ._mesh import Mesh, arrays_of, placed
 
@@ -69,7 +70,7 @@ class Tree(_core.Tree):
         Error
             ``code`` is ``"io"``, ``where`` the ``errno``.
         """
-        _core.save(os.fsdecode(path), self)
+        _core.save(os.fsencode(path_of("path", path)), self)
 
     def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
         import pickle
@@ -163,6 +164,7 @@ class Tree(_core.Tree):
         Error, ValueError, TypeError
             For a mesh that cannot be a solid or surface.
         """
+        check_callable("progress", progress)
         as_read = isinstance(mesh, Mesh)
         vertices, triangles = (mesh, faces) if faces is not None else arrays_of(mesh)
         if not as_read:
@@ -182,14 +184,16 @@ class Tree(_core.Tree):
         level: int | None = None,
         segments: int = 32,
         outer: bool | None = None,
+        view: tuple[float, float] | None = None,
+        up: str | None = None,
+        force: bool = False,
     ) -> None:
         """Write the ellipsoids for other programs.
 
         Parameters
         ----------
         path : path-like
-            Ends in ``.csv``, ``.json`` (full precision), ``.ply``, ``.obj`` (meshes), ``.glb`` (glTF) or ``.pov``. A
-            file that prolate did not write is not replaced.
+            Ends in ``.csv``, ``.json`` (full precision), ``.ply``, ``.obj`` (meshes), ``.glb`` (glTF) or ``.pov``.
         level : int, optional
             The cut at this level; negative ones count from the last. By default as ``prolate export --help`` says.
         segments : int
@@ -197,6 +201,10 @@ class Tree(_core.Tree):
         outer : bool, optional
             Of meshes: triangles outside the ellipsoids, which then cover (``.ply`` and ``.obj`` by default), or corners
             on them.
+        view, up
+            Of ``.pov``: as in :meth:`render`.
+        force : bool
+            Replace files that prolate did not write, too.
 
         Raises
         ------
@@ -204,11 +212,12 @@ class Tree(_core.Tree):
         """
         from . import _command
 
-        options = ["-o", os.fspath(path), "--segments", str(segments)]
-        if level is not None:
-            options += ["--level", str(level + self.level_count if level < 0 else level)]
-        if outer is not None:
-            options += ["--outer" if outer else "--no-outer"]
+        if level is not None and operator.index(level) < 0:
+            level += self.level_count
+        options = _command.flags(
+            output=os.path.abspath(path_of("path", path)), level=level, segments=segments, outer=outer is True,
+            no_outer=outer is False, view=view, up=up, force=bool(force),
+        )  # fmt: skip
         _command.run_on(self, "export", [], options)
 
     def render(
@@ -220,9 +229,12 @@ class Tree(_core.Tree):
         view: tuple[float, float] | None = None,
         up: str | None = None,
         heat: bool = False,
+        heat_top: float | None = None,
         section: str | None = None,
         style: str = "beside",
         samples: int | None = None,
+        shadow: bool = True,
+        threads: int = 0,
     ) -> NDArray[np.uint8]:
         """A picture of the tree, level by level; needs Pillow.
 
@@ -240,12 +252,18 @@ class Tree(_core.Tree):
             The axis that points up.
         heat : bool
             Colour by how far the tree sticks out of the mesh.
+        heat_top : float, optional
+            The same, with a legend that ends at this many % of the diagonal.
         section : str, optional
             ``"z"`` or ``"z,0.4"``: cut open across an axis.
         style : {"beside", "overlay", "none"}
             Where the mesh is.
         samples : int, optional
             Light samples a pixel, 16 ... 1024.
+        shadow : bool
+            On the floor.
+        threads : int
+            0 = all cores.
 
         Returns
         -------
@@ -257,16 +275,12 @@ class Tree(_core.Tree):
         """
         from . import _command
 
-        options = ["--size", f"{size[0]}x{size[1]}", "--mesh", style if mesh is not None else "none"]
-        if levels is not None:
-            options += ["--levels", ",".join(str(level) for level in levels)]
-        if view is not None:
-            options += ["--view", f"{view[0]},{view[1]}"]
-        for name, value in (("--up", up), ("--section", section), ("--samples", samples)):
-            if value is not None:
-                options += [name, str(value)]
-        if heat:
-            options.append("--heat")
+        options = _command.flags(
+            mesh=style if mesh is not None else "none",
+            size="x".join(map(str, size)) if isinstance(size, (list, tuple)) else size,
+            levels=levels, view=view, up=up, heat=bool(heat), heat_top=heat_top, section=section, samples=samples,
+            no_shadow=not shadow, threads=threads,
+        )  # fmt: skip
         return _command.picture(self, mesh, options)
 
     def view(self, mesh: Any = None) -> str:
@@ -312,7 +326,7 @@ def load(path: Union[str, os.PathLike[str]], *, check_hash: bool = True) -> Tree
     Error
         ``code`` is ``"io"``, ``"bad_file"`` or ``"newer_version"``.
     """
-    name = os.fsdecode(path)
+    name = path_of("path", path)
     try:
         with open(name, "rb") as file:
             data = file.read()

@@ -16,6 +16,10 @@ std::string type_text(nb::handle value) {
     return nb::cast<const char*>(value.type().attr("__name__"));
 }
 
+nb::object text_of(const std::string& bytes) {
+    return nb::steal(PyUnicode_DecodeUTF8(bytes.data(), static_cast<Py_ssize_t>(bytes.size()), "backslashreplace"));
+}
+
 double number(nb::handle value, const char* name) {
     const double out = PyFloat_AsDouble(value.ptr());
     if (out == -1.0 && PyErr_Occurred()) {

@@ -26,6 +26,9 @@ namespace nb = nanobind;
 /// The name of its type.
 std::string type_text(nb::handle value);
 
+/// As Python's text, whatever bytes a file or its name may have.
+nb::object text_of(const std::string& bytes);
+
 /// The library's Error; becomes prolate.Error. `detail` follows `what`.
 struct Failure {
     Error error;

@@ -312,8 +312,9 @@ ImportOptions import_options(nb::handle unit, nb::handle scale, nb::handle recen
 }
 
 // (vertices, faces, (scale, origin), notes, files)
-nb::tuple read_mesh(const char* path, nb::handle unit, nb::handle scale, nb::handle recentre) {
+nb::tuple read_mesh(const nb::bytes& name, nb::handle unit, nb::handle scale, nb::handle recentre) {
     const ImportOptions options = import_options(unit, scale, recentre);
+    const char* const path = name.c_str();
     ImportReport report;
     Progress progress;
     const auto mesh =
@@ -331,7 +332,7 @@ nb::tuple read_mesh(const char* path, nb::handle unit, nb::handle scale, nb::han
     const auto three = [](const std::array<double, 3>& a) { return nb::make_tuple(a[0], a[1], a[2]); };
     const auto texts = [](const std::vector<std::string>& from) {
         nb::list out;
-        for (const std::string& one : from) out.append(one.c_str());
+        for (const std::string& one : from) out.append(text_of(one));
         return out;
     };
     return nb::make_tuple(to_numpy(std::move(vertices), {n, 3}), to_numpy(std::move(faces), {m, 3}),
@@ -339,8 +340,9 @@ nb::tuple read_mesh(const char* path, nb::handle unit, nb::handle scale, nb::han
                           texts(report.notes), texts(report.files));
 }
 
-nb::object file_hash(const char* path, nb::handle unit, nb::handle scale, nb::handle recentre) {
+nb::object file_hash(const nb::bytes& name, nb::handle unit, nb::handle scale, nb::handle recentre) {
     const ImportOptions options = import_options(unit, scale, recentre);
+    const char* const path = name.c_str();
     const nb::gil_scoped_release released;
     const auto hash = hash_mesh_file(path, options);
     const nb::gil_scoped_acquire held;
@@ -374,8 +376,9 @@ void bind_bake(nb::module_& m) {
           nb::arg("recentre"));
     m.def("mesh_file_hash", &file_hash, nb::arg("path"), nb::arg("unit").none(), nb::arg("scale").none(),
           nb::arg("recentre"));
-    m.def("save", [](const char* path, nb::handle tree) {
+    m.def("save", [](const nb::bytes& name, nb::handle tree) {
         const HeldTree& held = tree_of(tree, "tree");
+        const char* const path = name.c_str();
         const auto saved = [&] {
             const nb::gil_scoped_release released;
             return save(path, held.view.bytes());

@@ -5,8 +5,6 @@
 #include <prolate/build.hpp>
 #include <prolate/version.hpp>
 
-#include <nanobind/stl/string.h>
-
 namespace prolate::python {
 namespace {
 
@@ -45,7 +43,7 @@ void translate(const std::exception_ptr& thrown, void*) {
         const nb::object type = nb::module_::import_("prolate._errors").attr("Error");
         std::string text = failure.error.what;
         if (!failure.detail.empty()) text += (text.empty() ? "" : ": ") + failure.detail;
-        const nb::object error = type(text, name_of(failure.error.code), failure.error.where);
+        const nb::object error = type(text_of(text), name_of(failure.error.code), failure.error.where);
         PyErr_SetObject(type.ptr(), error.ptr());
     }
 }
