@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Optional, Union
@@ -212,8 +211,9 @@ class Tree(_core.Tree):
         """
         from . import _command
 
-        if level is not None and operator.index(level) < 0:
-            level += self.level_count
+        if level is not None:
+            self.level_end(level)  # is there one?
+            level += self.level_count if level < 0 else 0
         options = _command.flags(
             output=os.path.abspath(path_of("path", path)), level=level, segments=segments, outer=outer is True,
             no_outer=outer is False, view=view, up=up, force=bool(force),
