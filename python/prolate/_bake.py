@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Union
 
 from . import _core
-from ._errors import check_callable
+from ._errors import check_callable, truth
 from ._mesh import Mesh, Placement, arrays_of, factors, length, metres, placed
 from ._tree import Progress, Tree, baked_tree
 
@@ -154,7 +154,7 @@ def core_options(options: dict[str, Any]) -> dict[str, object]:
         raise TypeError(f"bake() got an unexpected keyword argument {min(unknown)!r}")
     given = {**defaults, **options}
     lengths = {name: length(name, given[name]) for name in _LENGTHS}
-    return {**{name: given[name] for name in _OPTIONS}, **lengths, "exact": bool(given["exact"])}
+    return {**{name: given[name] for name in _OPTIONS}, **lengths, "exact": truth("exact", given["exact"])}
 
 
 def prepared(mesh: Any, options: dict[str, Any]) -> Prepared:
@@ -168,7 +168,7 @@ def prepared(mesh: Any, options: dict[str, Any]) -> Prepared:
         return Prepared(vertices, faces, (mesh.scale, mesh.origin), core)
     x, y, z = factors(options.get("scale"))
     step = metres(options.get("unit")) or 1.0
-    moved = placed(vertices, faces, (x * step, y * step, z * step), bool(options.get("recentre", False)))
+    moved = placed(vertices, faces, (x * step, y * step, z * step), truth("recentre", options.get("recentre", False)))
     return Prepared(*moved, core)
 
 

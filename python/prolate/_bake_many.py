@@ -111,6 +111,8 @@ def bake_many(
 
 def _asset(asset: AnyAsset) -> Asset:
     if isinstance(asset, Asset):
+        if not isinstance(asset.options, dict):
+            raise TypeError(f"options of an Asset must be a dict, not {type(asset.options).__name__}")
         return asset
     if isinstance(asset, (str, os.PathLike, Mesh)) or hasattr(asset, "vertices") or isinstance(asset, tuple):
         return Asset(asset)

@@ -35,10 +35,10 @@ class World:
     def __init__(self, slack: object) -> None: ...
     def __len__(self) -> int: ...
     def insert(
-        self, tree: object, pose: object, margin: object, layers: object, mask: object, wxyz: bool, /
+        self, tree: object, pose: object, margin: object, layers: object, mask: object, order: object, /
     ) -> int: ...
     def remove(self, id: object, /) -> None: ...
-    def move(self, ids: object, poses: object, wxyz: bool, /) -> None: ...
+    def move(self, ids: object, poses: object, order: object, /) -> None: ...
     def pairs(self) -> tuple[NDArray[np.uint64], NDArray[np.bool_]]: ...
     def collide(self, margin: object, threads: object, /) -> tuple[NDArray[np.uint64], _Bytes]: ...
 
@@ -73,7 +73,7 @@ def collide(
     budget: object,
     threads: object,
     out: object,
-    wxyz: bool,
+    order: object,
 ) -> int | _Bytes: ...
 def distance(
     a: object,
@@ -85,7 +85,7 @@ def distance(
     max_level: object,
     budget: object,
     threads: object,
-    wxyz: bool,
+    order: object,
 ) -> tuple[_PairArrays, bool]: ...
 def sweep(
     a: object,
@@ -99,7 +99,7 @@ def sweep(
     max_level: object,
     budget: object,
     threads: object,
-    wxyz: bool,
+    order: object,
 ) -> tuple[_PairArrays, _Floats, bool]: ...
 def raycast(
     tree: object,
@@ -111,7 +111,7 @@ def raycast(
     max_level: object,
     budget: object,
     threads: object,
-    wxyz: bool,
+    order: object,
 ) -> tuple[tuple[_Floats, _Floats, _Floats, _Index, _Index, _Bytes], bool]: ...
 def overlap(
     tree: object,
@@ -123,7 +123,7 @@ def overlap(
     budget: object,
     threads: object,
     out: object,
-    wxyz: bool,
+    order: object,
 ) -> int | _Bytes: ...
 def ground_distance(
     a: object,
@@ -133,7 +133,7 @@ def ground_distance(
     max_distance: object,
     budget: object,
     threads: object,
-    wxyz: bool,
+    order: object,
 ) -> tuple[_PairArrays, bool]: ...
 def ground_contacts(
     a: object,
@@ -143,9 +143,9 @@ def ground_contacts(
     max_level: object,
     budget: object,
     threads: object,
-    wxyz: bool,
+    order: object,
 ) -> tuple[tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, NDArray[np.uint64]], _Bytes]: ...
-def bounds(tree: object, poses: object, margin: object, wxyz: bool) -> tuple[_Floats, _Floats, bool]: ...
+def bounds(tree: object, poses: object, margin: object, order: object) -> tuple[_Floats, _Floats, bool]: ...
 def contacts(
     a: object,
     poses_a: object,
@@ -155,18 +155,18 @@ def contacts(
     max_level: object,
     budget: object,
     threads: object,
-    wxyz: bool,
+    order: object,
 ) -> tuple[tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, NDArray[np.uint64]], _Bytes]: ...
 def signed_distance(
-    tree: object, points: object, pose: object, max_distance: object, budget: object, threads: object, wxyz: bool
+    tree: object, points: object, pose: object, max_distance: object, budget: object, threads: object, order: object
 ) -> tuple[tuple[_Floats, _Floats, _Floats, _Floats, _Index, _Index, _Bytes], bool]: ...
-def contains(tree: object, points: object, pose: object, threads: object, wxyz: bool) -> int | _Bytes: ...
+def contains(tree: object, points: object, pose: object, threads: object, order: object) -> int | _Bytes: ...
 def box_tree(half: object) -> _Bytes: ...
 def cylinder_tree(radius: object, half_height: object) -> _Bytes: ...
 def convex_tree(points: object, faces: object) -> _Bytes: ...
 def ellipsoid_tree(radii: object) -> _Bytes: ...
 def sphere_tree(radius: object) -> _Bytes: ...
-def pairs_collide(radii: object, poses: object, pairs: object, margin: object, wxyz: bool) -> _Bytes: ...
+def pairs_collide(radii: object, poses: object, pairs: object, margin: object, order: object) -> _Bytes: ...
 def pairs_distance(
-    radii: object, poses: object, pairs: object, tolerance: object, wxyz: bool
+    radii: object, poses: object, pairs: object, tolerance: object, order: object
 ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats]: ...

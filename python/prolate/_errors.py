@@ -62,3 +62,10 @@ def path_of(name: str, path: Union[str, bytes, os.PathLike[str]]) -> str:
 def check_callable(name: str, function: object) -> None:
     if function is not None and not callable(function):
         raise TypeError(f"{name}: must be callable, not {type(function).__name__}")
+
+
+def truth(name: str, value: object) -> bool:
+    try:
+        return bool(value)
+    except (TypeError, ValueError):  # arrays
+        raise TypeError(f"{name}: must be True or False, not {type(value).__name__}") from None

@@ -9,7 +9,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 from . import _core
-from ._errors import path_of
+from ._errors import path_of, truth
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,7 +121,10 @@ def load_mesh(
         For an option.
     """
     vertices, faces, (by, origin), notes, _ = _core.load_mesh(
-        os.fsencode(path_of("path", path)), metres(unit), None if scale is None else factors(scale), bool(recentre)
+        os.fsencode(path_of("path", path)),
+        metres(unit),
+        None if scale is None else factors(scale),
+        truth("recentre", recentre),
     )
     return Mesh(vertices, faces, by, origin, notes)
 

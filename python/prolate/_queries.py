@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
 from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, Sweeps, Verdict
-from ._poses import IDENTITY, Order, is_wxyz
 from ._shapes import HalfSpace, Shape, ground, numbers
 
 if TYPE_CHECKING:
@@ -14,6 +13,8 @@ if TYPE_CHECKING:
 
     from ._answers import Verdicts
     from ._tree import Tree
+
+Order = Literal["xyzw", "wxyz"]
 
 _VERDICTS = tuple(Verdict)
 
@@ -72,9 +73,7 @@ def collide(
     -----
     Thread-safe; other Python threads run meanwhile. Ctrl-C ends it.
     """
-    found = _core.collide(
-        a, poses_a, b, poses_b, margin, max_level, budget, threads, out, order != "xyzw" and is_wxyz(order)
-    )
+    found = _core.collide(a, poses_a, b, poses_b, margin, max_level, budget, threads, out, order)
     return _VERDICTS[found] if found.__class__ is int else found
 
 
@@ -117,13 +116,9 @@ def distance(
     """
     if isinstance(b, HalfSpace):
         plane = ground(b, poses_b)
-        arrays, single = _core.ground_distance(
-            a, poses_a, plane, tolerance, max_distance, budget, threads, is_wxyz(order)
-        )
+        arrays, single = _core.ground_distance(a, poses_a, plane, tolerance, max_distance, budget, threads, order)
         return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
-    arrays, single = _core.distance(
-        a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, is_wxyz(order)
-    )
+    arrays, single = _core.distance(a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, order)
     return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
 
 
@@ -160,9 +155,9 @@ def contacts(
     """
     if isinstance(b, HalfSpace):
         plane = ground(b, poses_b)
-        arrays, verdict = _core.ground_contacts(a, poses_a, plane, margin, max_level, budget, threads, is_wxyz(order))
+        arrays, verdict = _core.ground_contacts(a, poses_a, plane, margin, max_level, budget, threads, order)
         return Contacts(*arrays, verdict)
-    arrays, verdict = _core.contacts(a, poses_a, b, poses_b, margin, max_level, budget, threads, is_wxyz(order))
+    arrays, verdict = _core.contacts(a, poses_a, b, poses_b, margin, max_level, budget, threads, order)
     return Contacts(*arrays, verdict)
 
 
@@ -205,7 +200,7 @@ def sweep(
         As :func:`collide`.
     """
     arrays, gap, single = _core.sweep(
-        a, start_a, end_a, b, start_b, end_b, margin, tolerance, max_level, budget, threads, is_wxyz(order)
+        a, start_a, end_a, b, start_b, end_b, margin, tolerance, max_level, budget, threads, order
     )
     lower, upper, point_a, point_b, normal, verdict = arrays
     fields = (lower, upper, point_a, point_b, normal, gap, verdict)
@@ -251,9 +246,7 @@ def raycast(
     ValueError, TypeError
         As :func:`collide`.
     """
-    arrays, single = _core.raycast(
-        tree, pose, origins, directions, radius, max_t, max_level, budget, threads, is_wxyz(order)
-    )
+    arrays, single = _core.raycast(tree, pose, origins, directions, radius, max_t, max_level, budget, threads, order)
     return Hits(*(x[0] for x in arrays)) if single else Hits(*arrays)
 
 
@@ -288,7 +281,7 @@ def overlap(
         As :func:`collide`.
     """
     kind, row = numbers(shape)
-    found = _core.overlap(tree, poses, kind, row, margin, max_level, budget, threads, out, is_wxyz(order))
+    found = _core.overlap(tree, poses, kind, row, margin, max_level, budget, threads, out, order)
     return _VERDICTS[found] if isinstance(found, int) else found
 
 
@@ -327,9 +320,7 @@ def signed_distance(
     ValueError, TypeError
         As :func:`collide`.
     """
-    wxyz = is_wxyz(order)
-    at = IDENTITY[order] if pose is None else pose
-    arrays, single = _core.signed_distance(tree, points, at, max_distance, budget, threads, wxyz)
+    arrays, single = _core.signed_distance(tree, points, pose, max_distance, budget, threads, order)
     return SignedDistances(*(x[0] for x in arrays)) if single else SignedDistances(*arrays)
 
 
@@ -348,9 +339,7 @@ def contains(
     uint8 array of shape (N,), or a Verdict for a single point
         ``SEPARATED``: outside, certainly.
     """
-    wxyz = is_wxyz(order)
-    at = IDENTITY[order] if pose is None else pose
-    found = _core.contains(tree, points, at, threads, wxyz)
+    found = _core.contains(tree, points, pose, threads, order)
     return _VERDICTS[found] if isinstance(found, int) else found
 
 
@@ -367,5 +356,5 @@ def bounds(tree: Tree, poses: ArrayLike, *, margin: float = 0, order: Order = "x
     Bounds
         Certified, and at most 1 or 2 % longer than the smallest along each axis.
     """
-    lower, upper, single = _core.bounds(tree, poses, margin, is_wxyz(order))
+    lower, upper, single = _core.bounds(tree, poses, margin, order)
     return Bounds(lower[0], upper[0]) if single else Bounds(lower, upper)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 from . import _core
-from ._errors import Error, check_callable, path_of
+from ._errors import Error, check_callable, path_of, truth
 from ._info import Asked, Diagnosis, Ellipsoids, LevelInfo, LevelProof, Mass, Proof, TreeInfo
 from ._mesh import Mesh, arrays_of, placed
 
@@ -30,7 +30,7 @@ class Tree(_core.Tree):
     _hash: int | None
 
     def __init__(self, buffer: object, check_hash: bool = True) -> None:
-        super().__init__(_bytes_of(buffer), check_hash)
+        super().__init__(_bytes_of(buffer), truth("check_hash", check_hash))
         self._report = None
         self._hash = None
 
@@ -216,7 +216,7 @@ class Tree(_core.Tree):
             level += self.level_count if level < 0 else 0
         options = _command.flags(
             output=os.path.abspath(path_of("path", path)), level=level, segments=segments, outer=outer is True,
-            no_outer=outer is False, view=view, up=up, force=bool(force),
+            no_outer=outer is False, view=view, up=up, force=truth("force", force),
         )  # fmt: skip
         _command.run_on(self, "export", [], options)
 
@@ -278,8 +278,8 @@ class Tree(_core.Tree):
         options = _command.flags(
             mesh=style if mesh is not None else "none",
             size="x".join(map(str, size)) if isinstance(size, (list, tuple)) else size,
-            levels=levels, view=view, up=up, heat=bool(heat), heat_top=heat_top, section=section, samples=samples,
-            no_shadow=not shadow, threads=threads,
+            levels=levels, view=view, up=up, heat=truth("heat", heat), heat_top=heat_top, section=section,
+            samples=samples, no_shadow=not truth("shadow", shadow), threads=threads,
         )  # fmt: skip
         return _command.picture(self, mesh, options)
 

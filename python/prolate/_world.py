@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from . import _core
-from ._poses import Order, is_wxyz
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from ._answers import Verdicts
+    from ._queries import Order
     from ._tree import Tree
 
 
@@ -78,7 +78,7 @@ class World:
             32 bits: the layers that the body is in, and those that it meets. Bodies of a pair meet each other.
         order : {"xyzw", "wxyz"}
         """
-        return self._world.insert(tree, pose, margin, layers, mask, is_wxyz(order))
+        return self._world.insert(tree, pose, margin, layers, mask, order)
 
     def remove(self, id: int) -> None:
         """Take a body away. Raises :class:`prolate.Error` with code ``"bad_id"`` if there is none."""
@@ -86,7 +86,7 @@ class World:
 
     def move(self, ids: ArrayLike, poses: ArrayLike, *, order: Order = "xyzw") -> None:
         """Move bodies ``ids`` (N,) to ``poses`` (N, 7) or (N, 4, 4); if one of them is wrong, none has moved."""
-        self._world.move(ids, poses, is_wxyz(order))
+        self._world.move(ids, poses, order)
 
     def pairs(self) -> WorldPairs:
         """All pairs whose boxes overlap, ordered."""

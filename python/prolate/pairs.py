@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from . import _core
-from ._poses import Order, is_wxyz
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ._answers import Floats, Verdicts
+    from ._queries import Order
 
 __all__ = ["PairDistances", "collide", "distance"]
 
@@ -64,7 +64,7 @@ def collide(
     ValueError, TypeError
         Naming argument and index.
     """
-    return _core.pairs_collide(radii, poses, pairs, margin, is_wxyz(order))
+    return _core.pairs_collide(radii, poses, pairs, margin, order)
 
 
 def distance(
@@ -89,4 +89,4 @@ def distance(
     ValueError, TypeError
         Naming argument and index.
     """
-    return PairDistances(*_core.pairs_distance(radii, poses, pairs, tolerance, is_wxyz(order)))
+    return PairDistances(*_core.pairs_distance(radii, poses, pairs, tolerance, order))

@@ -22,8 +22,9 @@ struct Limits {
     uint32_t max_level;
     uint64_t budget;
 
-    Limits(nb::handle margin_, nb::handle max_level_, nb::handle budget_)
-        : margin(number_from_0(margin_, "margin")),
+    /// `name`: the margin's, as callers have it.
+    Limits(nb::handle margin_, nb::handle max_level_, nb::handle budget_, const char* name = "margin")
+        : margin(number_from_0(margin_, name)),
           max_level(static_cast<uint32_t>(whole_or(max_level_, "max_level", 0, UINT32_MAX, kMaxLevels))),
           budget(whole_or(budget_, "budget", 0, UINT64_MAX, UINT64_MAX)) {}
 

@@ -12,9 +12,9 @@ namespace prolate::python {
 namespace {
 
 nb::tuple contacts_of(nb::handle a, nb::handle poses_a_, nb::handle b, nb::handle poses_b_, nb::handle margin,
-                      nb::handle max_level, nb::handle budget, nb::handle threads, bool wxyz) {
+                      nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle order) {
     const HeldTree &tree_a = tree_of(a, "a"), &tree_b = tree_of(b, "b");
-    const Poses poses_a(poses_a_, "poses_a", wxyz), poses_b(poses_b_, "poses_b", wxyz);
+    const Poses poses_a(poses_a_, "poses_a", order), poses_b(poses_b_, "poses_b", order);
     const size_t count = broadcast(poses_a, "poses_a", poses_b, "poses_b");
     const Limits limits(margin, max_level, budget);
     std::vector<std::vector<Contact>> found(count);
@@ -35,7 +35,7 @@ nb::tuple contacts_of(nb::handle a, nb::handle poses_a_, nb::handle b, nb::handl
 void bind_contacts(nb::module_& m) {
     m.def("contacts", &contacts_of, nb::arg("a").none(), nb::arg("poses_a").none(), nb::arg("b").none(),
           nb::arg("poses_b").none(), nb::arg("margin").none(), nb::arg("max_level").none(), nb::arg("budget").none(),
-          nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("threads").none(), nb::arg("order").none());
 }
 
 } // namespace prolate::python

@@ -38,9 +38,9 @@ std::vector<IndexPair> index_pairs(nb::handle pairs, size_t bodies) {
     return out;
 }
 
-Batch batch_of(nb::handle radii_, nb::handle poses_, nb::handle pairs, bool wxyz) {
+Batch batch_of(nb::handle radii_, nb::handle poses_, nb::handle pairs, nb::handle order) {
     const Rows<double> radii = rows_of_doubles(radii_, "radii", 3, true);
-    const Poses poses(poses_, "poses", wxyz);
+    const Poses poses(poses_, "poses", order);
     const size_t n = poses.count();
     if (radii.count != n && radii.count != 1)
         value_error("radii", "has " + std::to_string(radii.count) + " rows and poses " + std::to_string(n) +
@@ -71,8 +71,9 @@ Batch batch_of(nb::handle radii_, nb::handle poses_, nb::handle pairs, bool wxyz
     return out;
 }
 
-nb::object collide_ellipsoids(nb::handle radii, nb::handle poses, nb::handle pairs, nb::handle margin, bool wxyz) {
-    const Batch batch = batch_of(radii, poses, pairs, wxyz);
+nb::object collide_ellipsoids(nb::handle radii, nb::handle poses, nb::handle pairs, nb::handle margin,
+                              nb::handle order) {
+    const Batch batch = batch_of(radii, poses, pairs, order);
     const double wide = number_from_0(margin, "margin");
     std::vector<Verdict> verdicts(batch.pairs.size());
     {
@@ -85,8 +86,9 @@ nb::object collide_ellipsoids(nb::handle radii, nb::handle poses, nb::handle pai
 }
 
 // (lower, upper, point_a, point_b, normal)
-nb::tuple distance_ellipsoids(nb::handle radii, nb::handle poses, nb::handle pairs, nb::handle tolerance, bool wxyz) {
-    const Batch batch = batch_of(radii, poses, pairs, wxyz);
+nb::tuple distance_ellipsoids(nb::handle radii, nb::handle poses, nb::handle pairs, nb::handle tolerance,
+                              nb::handle order) {
+    const Batch batch = batch_of(radii, poses, pairs, order);
     const double near = number_from_0(tolerance, "tolerance");
     const size_t n = batch.pairs.size();
     std::vector<PairDistance> found(n);
@@ -115,9 +117,9 @@ nb::tuple distance_ellipsoids(nb::handle radii, nb::handle poses, nb::handle pai
 
 void bind_pairs(nb::module_& m) {
     m.def("pairs_collide", &collide_ellipsoids, nb::arg("radii").none(), nb::arg("poses").none(),
-          nb::arg("pairs").none(), nb::arg("margin").none(), nb::arg("wxyz"));
+          nb::arg("pairs").none(), nb::arg("margin").none(), nb::arg("order").none());
     m.def("pairs_distance", &distance_ellipsoids, nb::arg("radii").none(), nb::arg("poses").none(),
-          nb::arg("pairs").none(), nb::arg("tolerance").none(), nb::arg("wxyz"));
+          nb::arg("pairs").none(), nb::arg("tolerance").none(), nb::arg("order").none());
 }
 
 } // namespace prolate::python

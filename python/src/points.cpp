@@ -16,8 +16,9 @@ constexpr size_t kChunk = 128; // points that the runtime gets at a time
 // Points of a call, and the pose of the body; in the frame that the runtime asks in.
 class PlacedPoints {
 public:
-    PlacedPoints(nb::handle points, nb::handle pose, bool wxyz)
-        : points_(rows_of_doubles(points, "points", 3, true)), poses_(pose, "pose", wxyz) {
+    PlacedPoints(nb::handle points, nb::handle pose, nb::handle order)
+        : points_(rows_of_doubles(points, "points", 3, true)),
+          poses_(pose.is_none() ? Poses() : Poses(pose, "pose", order)) {
         if (!poses_.single()) value_error("pose", "must be one pose");
         body_ = poses_.at(0);
         // Where floats hold everything, the runtime answers as it does in C++.
@@ -91,9 +92,9 @@ void store(double* at, const Point& p, bool known) noexcept {
 
 // ((lower, upper, point, gradient, node, triangle, verdict), single)
 nb::tuple distances(nb::handle tree, nb::handle points_, nb::handle pose, nb::handle max_distance, nb::handle budget,
-                    nb::handle threads, bool wxyz) {
+                    nb::handle threads, nb::handle order) {
     const HeldTree& held = tree_of(tree, "tree");
-    const PlacedPoints points(points_, pose, wxyz);
+    const PlacedPoints points(points_, pose, order);
     PointOptions options;
     if (!max_distance.is_none()) options.max_distance = number_from_0(max_distance, "max_distance");
     options.max_pair_tests = whole_or(budget, "budget", 0, UINT64_MAX, UINT64_MAX);
@@ -118,9 +119,9 @@ nb::tuple distances(nb::handle tree, nb::handle points_, nb::handle pose, nb::ha
                           points.single());
 }
 
-nb::object sides(nb::handle tree, nb::handle points_, nb::handle pose, nb::handle threads, bool wxyz) {
+nb::object sides(nb::handle tree, nb::handle points_, nb::handle pose, nb::handle threads, nb::handle order) {
     const HeldTree& held = tree_of(tree, "tree");
-    const PlacedPoints points(points_, pose, wxyz);
+    const PlacedPoints points(points_, pose, order);
     auto verdict = new_array<uint8_t>(points.count());
     for_all(points.count(), thread_count(threads), [&](size_t i, QueryContext& context) {
         double slack = 0;
@@ -140,9 +141,9 @@ nb::object sides(nb::handle tree, nb::handle points_, nb::handle pose, nb::handl
 
 void bind_points(nb::module_& m) {
     m.def("signed_distance", &distances, nb::arg("tree").none(), nb::arg("points").none(), nb::arg("pose").none(),
-          nb::arg("max_distance").none(), nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("max_distance").none(), nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("order").none());
     m.def("contains", &sides, nb::arg("tree").none(), nb::arg("points").none(), nb::arg("pose").none(),
-          nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("threads").none(), nb::arg("order").none());
 }
 
 } // namespace prolate::python

@@ -48,6 +48,14 @@ DoublePose pose_of(const double (&m)[4][4]) noexcept {
     return {{m[0][3], m[1][3], m[2][3]}, {x, y, z, w}};
 }
 
+bool is_wxyz(nb::handle order) {
+    if (PyUnicode_Check(order.ptr())) {
+        if (PyUnicode_CompareWithASCIIString(order.ptr(), "xyzw") == 0) return false;
+        if (PyUnicode_CompareWithASCIIString(order.ptr(), "wxyz") == 0) return true;
+    }
+    value_error("order", "must be \"xyzw\" or \"wxyz\"");
+}
+
 // Doubles of any layout to `own`, the quaternion's real part last.
 void take_sevens(const double* from, size_t count, bool wxyz, std::vector<DoublePose>& own) {
     own.resize(count);
@@ -79,7 +87,11 @@ Point rotated_back(const DoublePose& pose, const Point& v) noexcept {
     return turned(conjugate(unit(pose.q)), v);
 }
 
-Poses::Poses(nb::handle value, const char* name, bool wxyz) {
+Poses::Poses() : count_(1), single_(true), own_(1) {
+    doubles_ = own_.data();
+}
+Poses::Poses(nb::handle value, const char* name, nb::handle order) {
+    const bool wxyz = is_wxyz(order);
     AnyArray array = import_array(value);
     keep_ = nb::borrow(value);
     const bool is_float = array.is_valid() && array.dtype() == nb::dtype<float>();

@@ -34,8 +34,11 @@ Point rotated_back(const DoublePose& pose, const Point& v) noexcept;
 /// Checked: finite, within the range of floats, no quaternion of zero.
 class Poses {
 public:
-    /// Shapes (7,), (N, 7), (4, 4) or (N, 4, 4); `wxyz`: quaternions have their real part first.
-    Poses(nb::handle value, const char* name, bool wxyz);
+    /// The identity, single.
+    Poses();
+    /// Shapes (7,), (N, 7), (4, 4) or (N, 4, 4). `order` is "xyzw" or "wxyz", which has the real part first.
+    Poses(nb::handle value, const char* name, nb::handle order);
+    Poses(Poses&&) = default; // a copy would point into the other's vector
 
     size_t count() const noexcept { return count_; }
     bool single() const noexcept { return single_; }

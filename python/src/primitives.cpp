@@ -6,8 +6,8 @@
 namespace prolate::python {
 namespace {
 
-nb::object bytes_of(Result<Tree>&& tree) {
-    if (!tree && tree.error().code == ErrorCode::bad_options) throw nb::value_error(tree.error().what);
+nb::object bytes_of(Result<Tree>&& tree, const char* sizes) {
+    if (!tree && tree.error().code == ErrorCode::bad_options) value_error(sizes, tree.error().what);
     return owned_bytes(value_or_throw(std::move(tree)).bytes());
 }
 
@@ -49,7 +49,7 @@ nb::object convex(nb::handle points, nb::handle faces) {
     auto tree = convex_tree(corners, triangles);
     if (!tree && tree.error().code == ErrorCode::bad_mesh)
         throw Failure{tree.error(), "faces[" + std::to_string(tree.error().where) + "]"};
-    return bytes_of(std::move(tree));
+    return bytes_of(std::move(tree), "points");
 }
 
 } // namespace
@@ -59,13 +59,14 @@ void bind_primitives(nb::module_& m) {
         "box_tree",
         [](nb::handle half) {
             const auto [x, y, z] = three_above_0(half, "half");
-            return bytes_of(box_tree({x, y, z}));
+            return bytes_of(box_tree({x, y, z}), "half");
         },
         nb::arg("half").none());
     m.def(
         "cylinder_tree",
         [](nb::handle radius, nb::handle half_height) {
-            return bytes_of(cylinder_tree(above_0(radius, "radius"), above_0(half_height, "half_height")));
+            return bytes_of(cylinder_tree(above_0(radius, "radius"), above_0(half_height, "half_height")),
+                            "radius, half_height");
         },
         nb::arg("radius").none(), nb::arg("half_height").none());
     m.def("convex_tree", &convex, nb::arg("points").none(), nb::arg("faces").none());
@@ -73,11 +74,11 @@ void bind_primitives(nb::module_& m) {
         "ellipsoid_tree",
         [](nb::handle radii) {
             const auto [a, b, c] = three_above_0(radii, "radii");
-            return bytes_of(ellipsoid_tree({.center = {}, .l11 = a, .l22 = b, .l33 = c}));
+            return bytes_of(ellipsoid_tree({.center = {}, .l11 = a, .l22 = b, .l33 = c}), "radii");
         },
         nb::arg("radii").none());
     m.def(
-        "sphere_tree", [](nb::handle radius) { return bytes_of(sphere_tree(above_0(radius, "radius"))); },
+        "sphere_tree", [](nb::handle radius) { return bytes_of(sphere_tree(above_0(radius, "radius")), "radius"); },
         nb::arg("radius").none());
 }
 

@@ -21,9 +21,9 @@ struct Bodies {
     Poses poses_a, poses_b;
     size_t count;
 
-    Bodies(nb::handle tree_a, nb::handle at_a, nb::handle tree_b, nb::handle at_b, bool wxyz)
-        : a(tree_of(tree_a, "a")), b(tree_of(tree_b, "b")), poses_a(at_a, "poses_a", wxyz),
-          poses_b(at_b, "poses_b", wxyz), count(broadcast(poses_a, "poses_a", poses_b, "poses_b")) {}
+    Bodies(nb::handle tree_a, nb::handle at_a, nb::handle tree_b, nb::handle at_b, nb::handle order)
+        : a(tree_of(tree_a, "a")), b(tree_of(tree_b, "b")), poses_a(at_a, "poses_a", order),
+          poses_b(at_b, "poses_b", order), count(broadcast(poses_a, "poses_a", poses_b, "poses_b")) {}
 
     bool single() const noexcept { return poses_a.single() && poses_b.single(); }
     bool far_apart(size_t i, double margin) const noexcept {
@@ -33,8 +33,9 @@ struct Bodies {
 };
 
 nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::handle poses_b, nb::handle margin,
-                         nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out, bool wxyz) {
-    const Bodies bodies(a, poses_a, b, poses_b, wxyz);
+                         nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out,
+                         nb::handle order) {
+    const Bodies bodies(a, poses_a, b, poses_b, order);
     const Limits limits(margin, max_level, budget);
     const Pose *const floats_a = bodies.poses_a.floats(), *const floats_b = bodies.poses_b.floats();
     const QueryOptions as_given = limits.options(0);
@@ -64,8 +65,8 @@ nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
 
 nb::tuple distance_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::handle poses_b, nb::handle tolerance,
                          nb::handle max_distance, nb::handle max_level, nb::handle budget, nb::handle threads,
-                         bool wxyz) {
-    const Bodies bodies(a, poses_a, b, poses_b, wxyz);
+                         nb::handle order) {
+    const Bodies bodies(a, poses_a, b, poses_b, order);
     DistanceOptions options;
     options.tolerance_relative = number_from_0(tolerance, "tolerance");
     options.max_level = static_cast<uint32_t>(whole_or(max_level, "max_level", 0, UINT32_MAX, kMaxLevels));
@@ -103,10 +104,10 @@ RoundedMotion motion_in(const DoublePose& frame, const DoublePose& start, const 
 
 nb::tuple sweep_trees(nb::handle a, nb::handle start_a, nb::handle end_a, nb::handle b, nb::handle start_b,
                       nb::handle end_b, nb::handle margin, nb::handle tolerance, nb::handle max_level,
-                      nb::handle budget, nb::handle threads, bool wxyz) {
+                      nb::handle budget, nb::handle threads, nb::handle order) {
     const HeldTree &tree_a = tree_of(a, "a"), &tree_b = tree_of(b, "b");
-    const Poses from_a(start_a, "start_a", wxyz), to_a(end_a, "end_a", wxyz), from_b(start_b, "start_b", wxyz),
-        to_b(end_b, "end_b", wxyz);
+    const Poses from_a(start_a, "start_a", order), to_a(end_a, "end_a", order), from_b(start_b, "start_b", order),
+        to_b(end_b, "end_b", order);
     const size_t count =
         std::max({broadcast(from_a, "start_a", to_a, "end_a"), broadcast(from_a, "start_a", from_b, "start_b"),
                   broadcast(to_a, "end_a", to_b, "end_b"), broadcast(from_b, "start_b", to_b, "end_b")});
@@ -162,9 +163,10 @@ PlacedRay placed_ray(const Poses& poses, size_t i, const double* origin, const d
 }
 
 nb::tuple raycast_tree(nb::handle tree, nb::handle pose, nb::handle origins, nb::handle directions, nb::handle radius,
-                       nb::handle max_t, nb::handle max_level, nb::handle budget, nb::handle threads, bool wxyz) {
+                       nb::handle max_t, nb::handle max_level, nb::handle budget, nb::handle threads,
+                       nb::handle order) {
     const HeldTree& held = tree_of(tree, "tree");
-    const Poses poses(pose, "pose", wxyz);
+    const Poses poses(pose, "pose", order);
     const Rows<double> origin = rows_of_doubles(origins, "origins", 3, true),
                        direction = rows_of_doubles(directions, "directions", 3, true);
     const size_t count = std::max({poses.count(), origin.count, direction.count});
@@ -173,7 +175,7 @@ nb::tuple raycast_tree(nb::handle tree, nb::handle pose, nb::handle origins, nb:
     for (size_t i = 0; i < direction.count; ++i)
         if (direction.values[3 * i] == 0 && direction.values[3 * i + 1] == 0 && direction.values[3 * i + 2] == 0)
             value_error("directions[" + std::to_string(i) + "]", "is 0");
-    const Limits limits(radius, max_level, budget);
+    const Limits limits(radius, max_level, budget, "radius");
     const float most_t =
         max_t.is_none() ? std::numeric_limits<float>::infinity() : rounded_up(number_from_0(max_t, "max_t"));
     auto t = new_array<double>(count), point = new_array<double>(3 * count), normal = new_array<double>(3 * count);
@@ -209,17 +211,17 @@ nb::tuple raycast_tree(nb::handle tree, nb::handle pose, nb::handle origins, nb:
 void bind_queries(nb::module_& m) {
     m.def("collide", &collide_trees, nb::arg("a").none(), nb::arg("poses_a").none(), nb::arg("b").none(),
           nb::arg("poses_b").none(), nb::arg("margin").none(), nb::arg("max_level").none(), nb::arg("budget").none(),
-          nb::arg("threads").none(), nb::arg("out").none(), nb::arg("wxyz"));
+          nb::arg("threads").none(), nb::arg("out").none(), nb::arg("order").none());
     m.def("distance", &distance_trees, nb::arg("a").none(), nb::arg("poses_a").none(), nb::arg("b").none(),
           nb::arg("poses_b").none(), nb::arg("tolerance").none(), nb::arg("max_distance").none(),
-          nb::arg("max_level").none(), nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("max_level").none(), nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("order").none());
     m.def("sweep", &sweep_trees, nb::arg("a").none(), nb::arg("start_a").none(), nb::arg("end_a").none(),
           nb::arg("b").none(), nb::arg("start_b").none(), nb::arg("end_b").none(), nb::arg("margin").none(),
           nb::arg("tolerance").none(), nb::arg("max_level").none(), nb::arg("budget").none(), nb::arg("threads").none(),
-          nb::arg("wxyz"));
+          nb::arg("order").none());
     m.def("raycast", &raycast_tree, nb::arg("tree").none(), nb::arg("pose").none(), nb::arg("origins").none(),
           nb::arg("directions").none(), nb::arg("radius").none(), nb::arg("max_t").none(), nb::arg("max_level").none(),
-          nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("order").none());
 }
 
 } // namespace prolate::python

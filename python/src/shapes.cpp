@@ -76,9 +76,10 @@ private:
 };
 
 nb::object overlap_shape(nb::handle tree, nb::handle poses_, const char* kind_, nb::handle numbers, nb::handle margin,
-                         nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out, bool wxyz) {
+                         nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out,
+                         nb::handle order) {
     const HeldTree& held = tree_of(tree, "tree");
-    const Poses poses(poses_, "poses", wxyz);
+    const Poses poses(poses_, "poses", order);
     const char kind = *kind_;
     const size_t columns = kind == 's' || kind == 'h' ? 4 : kind == 'c' ? 7 : 10;
     const Rows<double> row = rows_of_doubles(numbers, "shape", columns, true);
@@ -93,9 +94,9 @@ nb::object overlap_shape(nb::handle tree, nb::handle poses_, const char* kind_, 
 }
 
 // (lower (N, 3), upper (N, 3))
-nb::tuple bounds_of(nb::handle tree, nb::handle poses_, nb::handle margin, bool wxyz) {
+nb::tuple bounds_of(nb::handle tree, nb::handle poses_, nb::handle margin, nb::handle order) {
     const HeldTree& held = tree_of(tree, "tree");
-    const Poses poses(poses_, "poses", wxyz);
+    const Poses poses(poses_, "poses", order);
     const double wide = number_from_0(margin, "margin");
     const size_t n = poses.count();
     auto lower = new_array<double>(3 * n), upper = new_array<double>(3 * n);
@@ -120,9 +121,9 @@ struct OverGround {
     Poses poses;
     Rows<double> plane;
 
-    OverGround(nb::handle tree, nb::handle at, nb::handle numbers, bool wxyz)
-        : held(tree_of(tree, "a")), poses(at, "poses_a", wxyz), plane(rows_of_doubles(numbers, "half_space", 4, true)) {
-    }
+    OverGround(nb::handle tree, nb::handle at, nb::handle numbers, nb::handle order)
+        : held(tree_of(tree, "a")), poses(at, "poses_a", order),
+          plane(rows_of_doubles(numbers, "half_space", 4, true)) {}
 
     /// The ground in the frame of pose `i`.
     HalfSpace at(size_t i, PlacedBodies& placed) const noexcept {
@@ -133,8 +134,8 @@ struct OverGround {
 };
 
 nb::tuple ground_distance(nb::handle tree, nb::handle poses, nb::handle numbers, nb::handle tolerance,
-                          nb::handle max_distance, nb::handle budget, nb::handle threads, bool wxyz) {
-    const OverGround ground(tree, poses, numbers, wxyz);
+                          nb::handle max_distance, nb::handle budget, nb::handle threads, nb::handle order) {
+    const OverGround ground(tree, poses, numbers, order);
     DistanceOptions options;
     options.tolerance_relative = number_from_0(tolerance, "tolerance");
     options.max_pair_tests = whole_or(budget, "budget", 0, UINT64_MAX, UINT64_MAX);
@@ -151,8 +152,8 @@ nb::tuple ground_distance(nb::handle tree, nb::handle poses, nb::handle numbers,
 }
 
 nb::tuple ground_contacts(nb::handle tree, nb::handle poses, nb::handle numbers, nb::handle margin,
-                          nb::handle max_level, nb::handle budget, nb::handle threads, bool wxyz) {
-    const OverGround ground(tree, poses, numbers, wxyz);
+                          nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle order) {
+    const OverGround ground(tree, poses, numbers, order);
     const Limits limits(margin, max_level, budget);
     std::vector<std::vector<Contact>> found(ground.poses.count());
     auto verdict = new_array<uint8_t>(found.size());
@@ -172,15 +173,15 @@ nb::tuple ground_contacts(nb::handle tree, nb::handle poses, nb::handle numbers,
 void bind_shapes(nb::module_& m) {
     m.def("overlap", &overlap_shape, nb::arg("tree").none(), nb::arg("poses").none(), nb::arg("kind"),
           nb::arg("numbers").none(), nb::arg("margin").none(), nb::arg("max_level").none(), nb::arg("budget").none(),
-          nb::arg("threads").none(), nb::arg("out").none(), nb::arg("wxyz"));
+          nb::arg("threads").none(), nb::arg("out").none(), nb::arg("order").none());
     m.def("bounds", &bounds_of, nb::arg("tree").none(), nb::arg("poses").none(), nb::arg("margin").none(),
-          nb::arg("wxyz"));
+          nb::arg("order").none());
     m.def("ground_distance", &ground_distance, nb::arg("a").none(), nb::arg("poses_a").none(),
           nb::arg("half_space").none(), nb::arg("tolerance").none(), nb::arg("max_distance").none(),
-          nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("budget").none(), nb::arg("threads").none(), nb::arg("order").none());
     m.def("ground_contacts", &ground_contacts, nb::arg("a").none(), nb::arg("poses_a").none(),
           nb::arg("half_space").none(), nb::arg("margin").none(), nb::arg("max_level").none(), nb::arg("budget").none(),
-          nb::arg("threads").none(), nb::arg("wxyz"));
+          nb::arg("threads").none(), nb::arg("order").none());
 }
 
 } // namespace prolate::python

@@ -221,8 +221,10 @@ void bind_tree(nb::module_& m) {
         .def_prop_ro("level_count", [](const HeldTree& self) { return self.view.level_count(); })
         .def_prop_ro("node_count", [](const HeldTree& self) { return self.view.node_count(); })
         .def_prop_ro("has_triangles", [](const HeldTree& self) { return self.view.has_triangles(); })
-        .def("level_end", [](const HeldTree& self,
-                             nb::handle level) { return self.view.level(level_of(self.view, level)).end_byte; })
+        .def(
+            "level_end",
+            [](const HeldTree& self, nb::handle level) { return self.view.level(level_of(self.view, level)).end_byte; },
+            nb::arg("level").none())
         .def("info_dict", &info_of)
         .def("cut_arrays", &cut, nb::arg("level").none())
         .def("mesh_arrays", &mesh_of);

@@ -32,9 +32,9 @@ public:
         : world_(value_or_throw(World::create({.slack = static_cast<float>(slack_of(slack))}))) {}
 
     uint64_t insert(nb::handle tree, nb::handle pose, nb::handle margin, nb::handle layers, nb::handle mask,
-                    bool wxyz) {
+                    nb::handle order) {
         const HeldTree& held = tree_of(tree, "tree");
-        const Poses poses(pose, "pose", wxyz);
+        const Poses poses(pose, "pose", order);
         if (!poses.single()) value_error("pose", "must be one pose");
         const RoundedPose at = rounded(poses, 0, held.reach);
         const Body body{.shape = held.view,
@@ -52,9 +52,9 @@ public:
         gone_.push_back(std::move(trees_[number])); // pairs name the body until they are updated
         trees_.erase(number);
     }
-    void move(nb::handle ids, nb::handle poses_, bool wxyz) {
+    void move(nb::handle ids, nb::handle poses_, nb::handle order) {
         const std::vector<BodyId> bodies = ids_of(ids);
-        const Poses poses(poses_, "poses", wxyz);
+        const Poses poses(poses_, "poses", order);
         if (poses.count() != bodies.size()) value_error("poses", "must be as many as ids");
         std::vector<Pose> to(bodies.size());
         for (size_t i = 0; i < to.size(); ++i) to[i] = rounded(poses, i, 0).pose;
@@ -137,9 +137,9 @@ void bind_world(nb::module_& m) {
     nb::class_<HeldWorld>(m, "World")
         .def(nb::init<nb::handle>(), nb::arg("slack").none())
         .def("insert", &HeldWorld::insert, nb::arg("tree").none(), nb::arg("pose").none(), nb::arg("margin").none(),
-             nb::arg("layers").none(), nb::arg("mask").none(), nb::arg("wxyz"))
+             nb::arg("layers").none(), nb::arg("mask").none(), nb::arg("order").none())
         .def("remove", &HeldWorld::remove, nb::arg("id").none())
-        .def("move", &HeldWorld::move, nb::arg("ids").none(), nb::arg("poses").none(), nb::arg("wxyz"))
+        .def("move", &HeldWorld::move, nb::arg("ids").none(), nb::arg("poses").none(), nb::arg("order").none())
         .def("pairs", &HeldWorld::pairs)
         .def("collide", &HeldWorld::collide, nb::arg("margin").none(), nb::arg("threads").none())
         .def("__len__", &HeldWorld::count);
