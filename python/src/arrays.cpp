@@ -74,35 +74,10 @@ nb::object as_numpy(nb::handle value, const char* name, const char* dtype) {
     type_error(name, std::string("cannot be taken as an array of ") + dtype);
 }
 
-AnyArray import_array(nb::handle value) noexcept {
-    AnyArray out;
-    if (!nb::try_cast<AnyArray>(value, out, false)) {
-        PyErr_Clear();
-        return {};
-    }
-    return out;
-}
-
-bool is_contiguous(const AnyArray& array) noexcept {
-    if (array.dtype().lanes != 1 || array.dtype().bits % 8 != 0) return false;
-    int64_t step = 1;
-    for (size_t i = array.ndim(); i-- > 0;) {
-        if (array.shape(i) > 1 && array.stride(i) != step) return false;
-        step *= static_cast<int64_t>(array.shape(i));
-    }
-    return reinterpret_cast<uintptr_t>(array.data()) % array.itemsize() == 0;
-}
-
-std::string shape_text(const AnyArray& array) {
-    std::string out = "(";
-    for (size_t i = 0; i < array.ndim(); ++i) out += (i > 0 ? ", " : "") + std::to_string(array.shape(i));
-    return out + (array.ndim() == 1 ? ",)" : ")");
-}
-
 Rows<double> rows_of_doubles(nb::handle value, const char* name, size_t columns, bool may_be_single, bool finite) {
     Rows<double> out;
     AnyArray array = import_array(value);
-    if (!array.is_valid() || array.dtype() != nb::dtype<double>() || !is_contiguous(array)) {
+    if (!array.is_valid() || array.dtype() != nb::dtype<double>() || !array.is_contiguous()) {
         out.keep = as_numpy(value, name, "float64");
         array = import_array(out.keep);
     } else {
@@ -113,7 +88,7 @@ Rows<double> rows_of_doubles(nb::handle value, const char* name, size_t columns,
         const std::string n = std::to_string(columns);
         std::string wanted = "must have shape ";
         if (may_be_single) wanted.append("(").append(n).append(",) or ");
-        value_error(name, wanted.append("(N, ").append(n).append("), not ").append(shape_text(array)));
+        value_error(name, wanted.append("(N, ").append(n).append("), not ").append(array.shape_text()));
     }
     out.single = one;
     out.count = one ? 1 : array.shape(0);

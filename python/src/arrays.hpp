@@ -68,13 +68,33 @@ Rows<double> rows_of_doubles(nb::handle value, const char* name, size_t columns,
 /// numpy.ascontiguousarray(value, dtype), with an error that names the argument.
 nb::object as_numpy(nb::handle value, const char* name, const char* dtype);
 
-/// Any CPU array that need not be converted.
-using AnyArray = nb::ndarray<nb::ro, nb::device::cpu>;
+/// Any CPU array that need not be converted. Valid as long as the Python object is.
+class AnyArray {
+public:
+    AnyArray() = default;
+    bool is_valid() const noexcept { return dtype_.bits != 0; }
+    size_t ndim() const noexcept { return ndim_; }
+    size_t shape(size_t i) const noexcept { return static_cast<size_t>(shape_[i]); }
+    size_t size() const noexcept;
+    const void* data() const noexcept { return data_; }
+    nb::dlpack::dtype dtype() const noexcept { return dtype_; }
+    /// Are its elements one after the other, the last index fastest, and aligned?
+    bool is_contiguous() const noexcept;
+    std::string shape_text() const;
+
+private:
+    friend AnyArray import_array(nb::handle value) noexcept;
+    bool take_numpy(nb::handle value) noexcept;
+
+    const void* data_ = nullptr;
+    size_t ndim_ = 0;
+    const int64_t *shape_ = nullptr, *strides_ = nullptr;
+    int64_t stride_unit_ = 1; ///< bytes
+    nb::dlpack::dtype dtype_{};
+    nb::ndarray<nb::ro, nb::device::cpu> keep_; ///< what the pointers lie in, if not in the object itself
+};
 /// Imports `value` if it is an array of a plain type; an invalid array else.
 AnyArray import_array(nb::handle value) noexcept;
-/// Are its elements one after the other, the last index fastest, and aligned?
-bool is_contiguous(const AnyArray& array) noexcept;
-std::string shape_text(const AnyArray& array);
 
 /// A new numpy array over `data`, which it takes over. Not writable if `read_only`.
 template <class T>

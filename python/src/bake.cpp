@@ -102,7 +102,7 @@ std::span<const Triangle> take_faces(nb::handle faces, nb::object& keep) {
     const auto is_index = [](const AnyArray& a) {
         return a.dtype() == nb::dtype<uint32_t>() || a.dtype() == nb::dtype<int32_t>();
     };
-    if (!array.is_valid() || !is_index(array) || !is_contiguous(array)) {
+    if (!array.is_valid() || !is_index(array) || !array.is_contiguous()) {
         // Other integers are copied, in 64 bits first, so that none comes out as another.
         if (array.is_valid() && array.dtype().code != static_cast<uint8_t>(nb::dlpack::dtype_code::Int) &&
             array.dtype().code != static_cast<uint8_t>(nb::dlpack::dtype_code::UInt))
@@ -120,7 +120,7 @@ std::span<const Triangle> take_faces(nb::handle faces, nb::object& keep) {
     }
     if (array.ndim() != 2 || array.shape(1) != 3)
         value_error("faces",
-                    "must have shape (M, 3), not " + shape_text(array) + "; cut polygons into triangles first");
+                    "must have shape (M, 3), not " + array.shape_text() + "; cut polygons into triangles first");
     return {static_cast<const Triangle*>(array.data()), array.shape(0)};
 }
 
@@ -137,7 +137,7 @@ TakenMesh take_mesh(nb::handle vertices, nb::handle faces, nb::handle placement)
     TakenMesh out;
     AnyArray array = import_array(vertices);
     out.keep[0] = nb::borrow(vertices);
-    if (!array.is_valid() || array.dtype() != nb::dtype<float>() || !is_contiguous(array)) {
+    if (!array.is_valid() || array.dtype() != nb::dtype<float>() || !array.is_contiguous()) {
         out.keep[0] = as_numpy(vertices, "vertices", "float64");
         const AnyArray wide = import_array(out.keep[0]);
         const auto* from = static_cast<const double*>(wide.data());
@@ -148,7 +148,7 @@ TakenMesh take_mesh(nb::handle vertices, nb::handle faces, nb::handle placement)
         array = wide;
     }
     if (array.ndim() != 2 || array.shape(1) != 3)
-        value_error("vertices", "must have shape (N, 3), not " + shape_text(array));
+        value_error("vertices", "must have shape (N, 3), not " + array.shape_text());
     const std::span<const Vec3> points = out.vertices.empty()
                                              ? std::span(static_cast<const Vec3*>(array.data()), array.shape(0))
                                              : std::span<const Vec3>(out.vertices);

@@ -1,8 +1,7 @@
 // Contact manifolds at many poses, as ragged arrays: those of query i are rows offsets[i] ... offsets[i + 1] - 1.
 #include "python/src/answers.hpp"
 #include "python/src/batch.hpp"
-#include "python/src/poses.hpp"
-#include "python/src/tree.hpp"
+#include "python/src/bodies.hpp"
 
 #include <prolate/contacts.hpp>
 
@@ -11,23 +10,21 @@
 namespace prolate::python {
 namespace {
 
-nb::tuple contacts_of(nb::handle a, nb::handle poses_a_, nb::handle b, nb::handle poses_b_, nb::handle margin,
+nb::tuple contacts_of(nb::handle a, nb::handle poses_a, nb::handle b, nb::handle poses_b, nb::handle margin,
                       nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle order) {
-    const HeldTree &tree_a = tree_of(a, "a"), &tree_b = tree_of(b, "b");
-    const Poses poses_a(poses_a_, "poses_a", order), poses_b(poses_b_, "poses_b", order);
-    const size_t count = broadcast(poses_a, "poses_a", poses_b, "poses_b");
+    const Bodies bodies(a, poses_a, b, poses_b, order);
     const Limits limits(margin, max_level, budget);
-    std::vector<std::vector<Contact>> found(count);
-    auto verdict = new_array<uint8_t>(count);
-    for_all(count, thread_count(threads), [&](size_t i, QueryContext& context) {
-        const PlacedBodies at = place(poses_a, tree_a.reach, poses_b, tree_b.reach, i);
+    std::vector<std::vector<Contact>> found(bodies.count());
+    auto verdict = new_array<uint8_t>(found.size());
+    for_all(found.size(), thread_count(threads), [&](size_t i, QueryContext& context) {
+        const PlacedBodies at = bodies.placed(i);
         ContactManifolds manifolds;
         const ContactResult r =
-            contacts(tree_a.view, at.a, tree_b.view, at.b, manifolds, context, limits.options(at.slack));
+            contacts(bodies.a(), at.a, bodies.b(), at.b, manifolds, context, limits.options(at.slack));
         verdict[i] = static_cast<uint8_t>(r.verdict);
         collect(manifolds, at, found[i]);
     });
-    return nb::make_tuple(contact_arrays(found), to_numpy(std::move(verdict), {count}));
+    return nb::make_tuple(contact_arrays(found), to_numpy(std::move(verdict), {found.size()}));
 }
 
 } // namespace

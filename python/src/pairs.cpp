@@ -25,7 +25,8 @@ struct Batch {
 std::vector<IndexPair> index_pairs(nb::handle pairs, size_t bodies) {
     const nb::object array = as_numpy(pairs, "pairs", "int64");
     const AnyArray view = import_array(array);
-    if (view.ndim() != 2 || view.shape(1) != 2) value_error("pairs", "must have shape (M, 2), not " + shape_text(view));
+    if (view.ndim() != 2 || view.shape(1) != 2)
+        value_error("pairs", "must have shape (M, 2), not " + view.shape_text());
     const auto* from = static_cast<const int64_t*>(view.data());
     std::vector<IndexPair> out(view.shape(0));
     for (size_t i = 0; i < out.size(); ++i) {
@@ -48,10 +49,8 @@ Batch batch_of(nb::handle radii_, nb::handle poses_, nb::handle pairs, nb::handl
     Batch out;
     out.pairs = index_pairs(pairs, n);
     // One origin for all bodies: the first one's center, if floats do not hold the poses anyway.
-    const DoublePose frame = poses.floats() || n == 0
-                                 ? DoublePose{}
-                                 : DoublePose{{poses.at(0).t[0], poses.at(0).t[1], poses.at(0).t[2]}, {0, 0, 0, 1}};
-    out.origin = {frame.t[0], frame.t[1], frame.t[2]};
+    if (!poses.floats() && n > 0) out.origin = {poses.at(0).t[0], poses.at(0).t[1], poses.at(0).t[2]};
+    const Frame frame({{out.origin[0], out.origin[1], out.origin[2]}, {0, 0, 0, 1}});
     for (size_t i = 0; i < n; ++i) {
         const double* const r = &radii.values[3 * (radii.count == 1 ? 0 : i)];
         for (size_t k = 0; k < 3; ++k)

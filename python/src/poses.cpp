@@ -97,7 +97,7 @@ Poses::Poses(nb::handle value, const char* name, nb::handle order) {
     const bool is_float = array.is_valid() && array.dtype() == nb::dtype<float>();
     const bool is_double = array.is_valid() && array.dtype() == nb::dtype<double>();
     const bool sevens = array.is_valid() && array.ndim() <= 2 && array.ndim() > 0 && array.shape(array.ndim() - 1) == 7;
-    const bool as_is = (is_float || is_double) && is_contiguous(array);
+    const bool as_is = (is_float || is_double) && array.is_contiguous();
     if (!as_is || (is_float && (wxyz || !sevens))) {
         keep_ = as_numpy(value, name, "float64");
         array = import_array(keep_);
@@ -106,7 +106,7 @@ Poses::Poses(nb::handle value, const char* name, nb::handle order) {
     const auto size = [&](size_t from_last) { return ndim >= from_last ? array.shape(ndim - from_last) : 0; };
     const bool matrices = (ndim == 2 || ndim == 3) && size(1) == 4 && size(2) == 4;
     if (!matrices && !((ndim == 1 || ndim == 2) && size(1) == 7))
-        value_error(name, "must have shape (7,), (N, 7), (4, 4) or (N, 4, 4), not " + shape_text(array));
+        value_error(name, "must have shape (7,), (N, 7), (4, 4) or (N, 4, 4), not " + array.shape_text());
     single_ = ndim == (matrices ? 2u : 1u);
     count_ = single_ ? 1 : array.shape(0);
     if (matrices) {
@@ -173,11 +173,13 @@ Point PlacedBodies::direction_to_world(const Vec3& v) const noexcept {
     return in_frame ? rotated(frame, direction) : direction;
 }
 
-RoundedPose in_frame(const DoublePose& frame, const DoublePose& body, double reach) noexcept {
-    const Quaternion back = conjugate(unit(frame.q));
-    const Point d = {body.t[0] - frame.t[0], body.t[1] - frame.t[1], body.t[2] - frame.t[2]};
-    const Point t = turned(back, d);
-    const Quaternion q = product(back, unit(body.q));
+Frame::Frame(const DoublePose& of) noexcept : pose(of), back(conjugate(unit(of.q))) {}
+
+RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) noexcept {
+    const DoublePose& at = frame.pose;
+    const Point d = {body.t[0] - at.t[0], body.t[1] - at.t[1], body.t[2] - at.t[2]};
+    const Point t = turned(frame.back, d);
+    const Quaternion q = product(frame.back, unit(body.q));
     const DoublePose exact{{t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}};
     const Pose pose = to_floats(exact);
     const auto square = [](double x) { return x * x; };
@@ -189,37 +191,6 @@ RoundedPose in_frame(const DoublePose& frame, const DoublePose& body, double rea
     // The last term is more than what double precision loses above.
     const double lengths = std::abs(d[0]) + std::abs(d[1]) + std::abs(d[2]) + reach;
     return {pose, 1.0001 * (std::sqrt(moved) + 2 * std::sqrt(bent) * reach) + 0x1p-46 * lengths};
-}
-
-bool far_apart(const Poses& a, double reach_a, const Poses& b, double reach_b, double margin, size_t i) noexcept {
-    if (a.floats() && b.floats()) return false;
-    const DoublePose pose_a = a.at(i), pose_b = b.at(i);
-    const double x = pose_b.t[0] - pose_a.t[0], y = pose_b.t[1] - pose_a.t[1], z = pose_b.t[2] - pose_a.t[2];
-    const double near = (reach_a + reach_b + margin) * (1 + 1e-12);
-    return x * x + y * y + z * z > near * near;
-}
-
-PlacedBodies place(const Poses& a, double reach_a, const Poses& b, double reach_b, size_t i) noexcept {
-    PlacedBodies out;
-    if (a.floats() && b.floats()) {
-        out.a = a.floats()[a.index(i)];
-        out.b = b.floats()[b.index(i)];
-        return out;
-    }
-    const DoublePose pose_a = a.at(i), pose_b = b.at(i);
-    if (holds_floats(pose_a) && holds_floats(pose_b)) {
-        out.a = to_floats(pose_a);
-        out.b = to_floats(pose_b);
-        return out;
-    }
-    // The rounding of a rotation moves the smaller body least.
-    out.in_frame = true;
-    const bool frame_is_a = reach_a >= reach_b;
-    out.frame = frame_is_a ? pose_a : pose_b;
-    const RoundedPose other = frame_is_a ? in_frame(pose_a, pose_b, reach_b) : in_frame(pose_b, pose_a, reach_a);
-    (frame_is_a ? out.b : out.a) = other.pose;
-    out.slack = other.slack;
-    return out;
 }
 
 } // namespace prolate::python

@@ -72,18 +72,19 @@ struct PlacedBodies {
     Point to_world(const Vec3& p) const noexcept;
     Point direction_to_world(const Vec3& v) const noexcept;
 };
-/// reach: no point of the body is farther from its origin.
-PlacedBodies place(const Poses& a, double reach_a, const Poses& b, double reach_b, size_t i) noexcept;
-
-/// Are bodies of doubles so far apart that spheres around their origins tell? Then collide() says separated, too: its
-/// spheres lie in these, and it allows for less rounding.
-bool far_apart(const Poses& a, double reach_a, const Poses& b, double reach_b, double margin, size_t i) noexcept;
+/// A pose in which others are taken.
+struct Frame {
+    DoublePose pose;
+    std::array<double, 4> back{0, 0, 0, 1}; ///< the unit quaternion of the inverse rotation
+    Frame() = default;
+    explicit Frame(const DoublePose& of) noexcept;
+};
 
 /// The pose of `body` in `frame`, rounded, and by how much that moves a point at `reach`.
 struct RoundedPose {
     Pose pose;
     double slack;
 };
-RoundedPose in_frame(const DoublePose& frame, const DoublePose& body, double reach) noexcept;
+RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) noexcept;
 
 } // namespace prolate::python

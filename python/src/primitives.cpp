@@ -36,7 +36,8 @@ nb::object convex(nb::handle points, nb::handle faces) {
     }
     const nb::object array = as_numpy(faces, "faces", "int64");
     const AnyArray view = import_array(array);
-    if (view.ndim() != 2 || view.shape(1) != 3) value_error("faces", "must have shape (M, 3), not " + shape_text(view));
+    if (view.ndim() != 2 || view.shape(1) != 3)
+        value_error("faces", "must have shape (M, 3), not " + view.shape_text());
     std::vector<Triangle> triangles(view.shape(0));
     const auto* const from = static_cast<const int64_t*>(view.data());
     for (size_t i = 0; i < 3 * triangles.size(); ++i) {

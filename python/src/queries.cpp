@@ -1,8 +1,7 @@
 // Queries about trees at many poses: collide, distance, sweep, raycast.
 #include "python/src/answers.hpp"
 #include "python/src/batch.hpp"
-#include "python/src/poses.hpp"
-#include "python/src/tree.hpp"
+#include "python/src/bodies.hpp"
 
 #include <prolate/collide.hpp>
 #include <prolate/distance.hpp>
@@ -15,39 +14,16 @@
 namespace prolate::python {
 namespace {
 
-// Two bodies at N poses.
-struct Bodies {
-    const HeldTree &a, &b;
-    Poses poses_a, poses_b;
-    size_t count;
-
-    Bodies(nb::handle tree_a, nb::handle at_a, nb::handle tree_b, nb::handle at_b, nb::handle order)
-        : a(tree_of(tree_a, "a")), b(tree_of(tree_b, "b")), poses_a(at_a, "poses_a", order),
-          poses_b(at_b, "poses_b", order), count(broadcast(poses_a, "poses_a", poses_b, "poses_b")) {}
-
-    bool single() const noexcept { return poses_a.single() && poses_b.single(); }
-    bool far_apart(size_t i, double margin) const noexcept {
-        return python::far_apart(poses_a, a.reach, poses_b, b.reach, margin, i);
-    }
-    PlacedBodies placed(size_t i) const noexcept { return place(poses_a, a.reach, poses_b, b.reach, i); }
-};
-
 nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::handle poses_b, nb::handle margin,
                          nb::handle max_level, nb::handle budget, nb::handle threads, nb::handle out,
                          nb::handle order) {
     const Bodies bodies(a, poses_a, b, poses_b, order);
     const Limits limits(margin, max_level, budget);
-    const Pose *const floats_a = bodies.poses_a.floats(), *const floats_b = bodies.poses_b.floats();
-    const QueryOptions as_given = limits.options(0);
     const auto verdict_of = [&](size_t i, QueryContext& context) {
-        if (floats_a && floats_b)
-            return static_cast<uint8_t>(collide(bodies.a.view, floats_a[bodies.poses_a.index(i)], bodies.b.view,
-                                                floats_b[bodies.poses_b.index(i)], context, as_given)
-                                            .verdict);
         if (limits.budget > 0 && bodies.far_apart(i, limits.margin)) return static_cast<uint8_t>(Verdict::separated);
         const PlacedBodies at = bodies.placed(i);
         return static_cast<uint8_t>(
-            collide(bodies.a.view, at.a, bodies.b.view, at.b, context, limits.options(at.slack)).verdict);
+            collide(bodies.a(), at.a, bodies.b(), at.b, context, limits.options(at.slack)).verdict);
     };
     if (bodies.single() && out.is_none()) {
         uint8_t verdict = 0;
@@ -57,8 +33,8 @@ nb::object collide_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
         }
         return nb::int_(verdict);
     }
-    const OutBytes results = out_bytes(out, bodies.count);
-    for_all(bodies.count, thread_count(threads),
+    const OutBytes results = out_bytes(out, bodies.count());
+    for_all(bodies.count(), thread_count(threads),
             [&](size_t i, QueryContext& context) { results.data[i] = verdict_of(i, context); });
     return results.array;
 }
@@ -73,12 +49,12 @@ nb::tuple distance_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
     options.max_pair_tests = whole_or(budget, "budget", 0, UINT64_MAX, UINT64_MAX);
     const double most =
         max_distance.is_none() ? std::numeric_limits<double>::infinity() : number_from_0(max_distance, "max_distance");
-    PairArrays out(bodies.count);
-    for_all(bodies.count, thread_count(threads), [&](size_t i, QueryContext& context) {
+    PairArrays out(bodies.count());
+    for_all(bodies.count(), thread_count(threads), [&](size_t i, QueryContext& context) {
         const PlacedBodies at = bodies.placed(i);
         DistanceOptions here = options;
         here.max_distance = most + at.slack;
-        const DistanceResult r = distance(bodies.a.view, at.a, bodies.b.view, at.b, context, here);
+        const DistanceResult r = distance(bodies.a(), at.a, bodies.b(), at.b, context, here);
         out.store(i, r, at);
     });
     return nb::make_tuple(out.take(), bodies.single());
@@ -91,8 +67,7 @@ struct RoundedMotion {
     Motion motion;
     double slack;
 };
-RoundedMotion motion_in(const DoublePose& frame, const DoublePose& start, const DoublePose& end,
-                        double reach) noexcept {
+RoundedMotion motion_in(const Frame& frame, const DoublePose& start, const DoublePose& end, double reach) noexcept {
     const RoundedPose from = in_frame(frame, start, reach), to = in_frame(frame, end, reach);
     // In between, a point is off by no more than at both ends together, the turn of at most pi between them included;
     // motion_between() rounds once more, at most by as much.
@@ -119,8 +94,9 @@ nb::tuple sweep_trees(nb::handle a, nb::handle start_a, nb::handle end_a, nb::ha
         PlacedBodies at;
         at.in_frame = true;
         at.frame = from_a.at(i);
-        const RoundedMotion motion_a = motion_in(at.frame, from_a.at(i), to_a.at(i), tree_a.reach);
-        const RoundedMotion motion_b = motion_in(at.frame, from_b.at(i), to_b.at(i), tree_b.reach);
+        const Frame frame(at.frame);
+        const RoundedMotion motion_a = motion_in(frame, from_a.at(i), to_a.at(i), tree_a.reach);
+        const RoundedMotion motion_b = motion_in(frame, from_b.at(i), to_b.at(i), tree_b.reach);
         const QueryOptions shared = limits.options(motion_a.slack + motion_b.slack);
         const SweepResult r = sweep(tree_a.view, motion_a.motion, tree_b.view, motion_b.motion, context,
                                     {.tolerance = near,

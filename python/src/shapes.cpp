@@ -62,8 +62,8 @@ public:
             return ask(Capsule{a, b, rounded_up(n_[6])});
         }
         if (kind_ == 'b') {
-            const RoundedPose box =
-                in_frame(body, {{n_[0], n_[1], n_[2]}, {n_[3], n_[4], n_[5], n_[6]}}, std::hypot(n_[7], n_[8], n_[9]));
+            const RoundedPose box = in_frame(Frame(body), {{n_[0], n_[1], n_[2]}, {n_[3], n_[4], n_[5], n_[6]}},
+                                             std::hypot(n_[7], n_[8], n_[9]));
             slack = box.slack;
             return ask(Box{box.pose, {rounded_up(n_[7]), rounded_up(n_[8]), rounded_up(n_[9])}});
         }

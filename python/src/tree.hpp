@@ -5,13 +5,17 @@
 
 #include <prolate/tree.hpp>
 
+#include <array>
+
 namespace prolate::python {
 
 /// Immutable, so that threads may share it.
 struct HeldTree {
     TreeView view;
     nb::object owner; ///< of the bytes
-    double reach;     ///< no point of the body is farther from its origin, metres
+    /// A ball that holds the body, in its frame, metres; and no point of it is farther from the origin than `reach`.
+    std::array<double, 3> center;
+    double radius, reach;
 };
 
 /// The tree that `value` is; a TypeError that names the argument if it is none.

@@ -18,14 +18,9 @@ double norm(std::initializer_list<double> values) {
     return std::sqrt(sum);
 }
 
-double reach_of(const TreeView& tree) {
-    const Ellipsoid& e = tree.root_bound();
-    return norm({e.center.x, e.center.y, e.center.z}) + norm({e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
-}
-
 HeldTree open_tree(nb::handle buffer, bool check_hash) {
     const AnyArray array = import_array(buffer);
-    if (!array.is_valid() || array.dtype() != nb::dtype<uint8_t>() || array.ndim() != 1 || !is_contiguous(array))
+    if (!array.is_valid() || array.dtype() != nb::dtype<uint8_t>() || array.ndim() != 1 || !array.is_contiguous())
         type_error("buffer", "must be contiguous bytes");
     const auto* data = static_cast<const std::byte*>(array.data());
     const std::span<const std::byte> bytes(data, array.shape(0));
@@ -34,7 +29,13 @@ HeldTree open_tree(nb::handle buffer, bool check_hash) {
         return TreeView::open(bytes, {.check_hash = check_hash});
     }();
     if (!view) throw Failure{view.error(), "at byte " + std::to_string(view.error().where)};
-    return {*view, nb::borrow(buffer), reach_of(*view)};
+    const Ellipsoid& e = view->root_bound();
+    const double radius = norm({e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
+    return {*view,
+            nb::borrow(buffer),
+            {e.center.x, e.center.y, e.center.z},
+            radius,
+            norm({e.center.x, e.center.y, e.center.z}) + radius};
 }
 
 uint32_t level_of(const TreeView& tree, nb::handle level) {

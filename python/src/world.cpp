@@ -110,7 +110,7 @@ private:
     static std::vector<BodyId> ids_of(nb::handle ids) {
         const nb::object array = as_numpy(ids, "ids", "uint64");
         const AnyArray view = import_array(array);
-        if (view.ndim() != 1) value_error("ids", "must have shape (N,), not " + shape_text(view));
+        if (view.ndim() != 1) value_error("ids", "must have shape (N,), not " + view.shape_text());
         std::vector<BodyId> out;
         for (size_t i = 0; i < view.shape(0); ++i) out.push_back(id_of(static_cast<const uint64_t*>(view.data())[i]));
         return out;
