@@ -16,17 +16,24 @@ constexpr double kMost = std::numeric_limits<float>::max();
 
 using Quaternion = std::array<double, 4>;
 
-// Of doubles whose squares stay in range: check() lets nothing else through.
-Quaternion unit(const double (&q)[4]) noexcept {
-    const double scale = 1 / std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+// All quaternions here have squares within range: check() lets nothing else through.
+double square_of(const Quaternion& q) noexcept {
+    return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+}
+Quaternion turn_of(const DoublePose& pose) noexcept {
+    return {pose.q[0], pose.q[1], pose.q[2], pose.q[3]};
+}
+Quaternion unit(const Quaternion& q) noexcept {
+    const double scale = 1 / std::sqrt(square_of(q));
     return {q[0] * scale, q[1] * scale, q[2] * scale, q[3] * scale};
 }
 
+// By a quaternion of any length.
 Point turned(const Quaternion& q, const Point& v) noexcept {
-    const double x = q[0], y = q[1], z = q[2], w = q[3];
-    return {(1 - 2 * (y * y + z * z)) * v[0] + 2 * (x * y - z * w) * v[1] + 2 * (x * z + y * w) * v[2],
-            2 * (x * y + z * w) * v[0] + (1 - 2 * (x * x + z * z)) * v[1] + 2 * (y * z - x * w) * v[2],
-            2 * (x * z - y * w) * v[0] + 2 * (y * z + x * w) * v[1] + (1 - 2 * (x * x + y * y)) * v[2]};
+    const double s = 2 / square_of(q), x = q[0], y = q[1], z = q[2], w = q[3];
+    return {(1 - s * (y * y + z * z)) * v[0] + s * ((x * y - z * w) * v[1] + (x * z + y * w) * v[2]),
+            (1 - s * (x * x + z * z)) * v[1] + s * ((x * y + z * w) * v[0] + (y * z - x * w) * v[2]),
+            (1 - s * (x * x + y * y)) * v[2] + s * ((x * z - y * w) * v[0] + (y * z + x * w) * v[1])};
 }
 Quaternion conjugate(const Quaternion& q) noexcept {
     return {-q[0], -q[1], -q[2], q[3]};
@@ -81,10 +88,10 @@ Point transformed(const DoublePose& pose, const Point& p) noexcept {
     return {r[0] + pose.t[0], r[1] + pose.t[1], r[2] + pose.t[2]};
 }
 Point rotated(const DoublePose& pose, const Point& v) noexcept {
-    return turned(unit(pose.q), v);
+    return turned(turn_of(pose), v);
 }
 Point rotated_back(const DoublePose& pose, const Point& v) noexcept {
-    return turned(conjugate(unit(pose.q)), v);
+    return turned(conjugate(turn_of(pose)), v);
 }
 
 Poses::Poses() : count_(1), single_(true), own_(1) {
@@ -173,24 +180,29 @@ Point PlacedBodies::direction_to_world(const Vec3& v) const noexcept {
     return in_frame ? rotated(frame, direction) : direction;
 }
 
-Frame::Frame(const DoublePose& of) noexcept : pose(of), back(conjugate(unit(of.q))) {}
+Frame::Frame(const DoublePose& of) noexcept : pose(of), back(conjugate(unit(turn_of(of)))) {}
 
 RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) noexcept {
     const DoublePose& at = frame.pose;
     const Point d = {body.t[0] - at.t[0], body.t[1] - at.t[1], body.t[2] - at.t[2]};
     const Point t = turned(frame.back, d);
-    const Quaternion q = product(frame.back, unit(body.q));
+    // Quaternions of about length 1 need not be made exactly so for the runtime.
+    const Quaternion given = turn_of(body);
+    const double squares = square_of(given);
+    const bool plain = squares > 0x1p-20 && squares < 0x1p20;
+    const Quaternion q = product(frame.back, plain ? given : unit(given));
     const DoublePose exact{{t[0], t[1], t[2]}, {q[0], q[1], q[2], q[3]}};
     const Pose pose = to_floats(exact);
     const auto square = [](double x) { return x * x; };
     const double moved =
         square(t[0] - pose.translation.x) + square(t[1] - pose.translation.y) + square(t[2] - pose.translation.z);
-    const double bent = square(q[0] - pose.rotation.x) + square(q[1] - pose.rotation.y) +
-                        square(q[2] - pose.rotation.z) + square(q[3] - pose.rotation.w);
-    // A unit quaternion that is off by `bent`, and made one again, turns by another angle of at most 2 bent (1 + bent).
+    const double bent_squares = square(q[0] - pose.rotation.x) + square(q[1] - pose.rotation.y) +
+                                square(q[2] - pose.rotation.z) + square(q[3] - pose.rotation.w);
+    const double bent = std::sqrt(plain ? bent_squares / squares : bent_squares);
+    // A quaternion that is off by the part `bent` of its length turns by another angle of at most 2 bent (1 + bent).
     // The last term is more than what double precision loses above.
     const double lengths = std::abs(d[0]) + std::abs(d[1]) + std::abs(d[2]) + reach;
-    return {pose, 1.0001 * (std::sqrt(moved) + 2 * std::sqrt(bent) * reach) + 0x1p-46 * lengths};
+    return {pose, 1.0001 * (std::sqrt(moved) + 2 * bent * reach) + 0x1p-46 * lengths};
 }
 
 } // namespace prolate::python
