@@ -1,5 +1,13 @@
 # What the package is built from, by the names that Debian 12 has for it: whoever runs `pip install .` is told in one line
 # what is missing, before any of the searches of the folders fails by itself.
+if(Python_EXECUTABLE)
+  execute_process(COMMAND ${Python_EXECUTABLE} -c "import sysconfig; print(sysconfig.get_config_var('Py_GIL_DISABLED') or 0)"
+    OUTPUT_VARIABLE free_threaded OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(free_threaded)
+    message(FATAL_ERROR "prolate: free-threaded Python (${Python_EXECUTABLE}) is not supported; use one with the global lock")
+  endif()
+endif()
+
 set(missing "")
 function(require package header)
   find_path(found_${package} ${header} PATH_SUFFIXES ${ARGN})

@@ -53,6 +53,9 @@ void translate(const std::exception_ptr& thrown, void*) {
 
 NB_MODULE(_core, m) {
     using namespace prolate;
+    // From Python 3.12 on, the interpreter itself refuses such an import, of any module like this one.
+    if (PyInterpreterState_GetID(PyInterpreterState_Get()) != 0)
+        throw nanobind::import_error("prolate does not support loading in subinterpreters");
     nanobind::register_exception_translator(python::translate);
     m.attr("LIBRARY_VERSION") = library_version();
     m.attr("FORMAT_VERSION") = unsigned{kFormatVersion};

@@ -73,7 +73,7 @@ USUAL = {
     "vertices": vertices,
     "faces": faces,
     "mesh": st.just(box_mesh(HALF_A)),
-    "assets": st.lists(st.tuples(vertices, faces), max_size=2),
+    "assets": st.lists(st.builds(prolate.Asset, st.tuples(vertices, faces), st.just({"exact": True})), max_size=2),
     "shape": shapes,
     "pairs": st.just([[0, 0]]),
     "ids": st.just([1 << 32]),

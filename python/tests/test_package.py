@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,13 +18,14 @@ import prolate
 from conftest import HALF_A, box_mesh
 from prolate import _command
 
+REQUIREMENTS = Path(__file__).parents[1] / "requirements.cmake"
 needs_command = pytest.mark.skipif(not os.path.exists(_command._EXECUTABLE), reason="built without the command")
 
 
 @needs_command
 def test_exports(tmp_path, cover):
     for kind in ("csv", "json", "ply", "obj", "glb", "pov"):
-        cover.export(tmp_path / f"cover.{kind}", level=-2)
+        cover.export(tmp_path / f"cover.{kind}", level=-2, view=(-30, 20) if kind == "pov" else None)
     cut = cover.cut(1)
     rows = np.loadtxt(tmp_path / "cover.csv", delimiter=",", skiprows=1)
     assert np.array_equal(rows[:, 1:4], cut.center) and np.array_equal(rows[:, 4:7], cut.radii)
@@ -32,6 +37,8 @@ def test_exports(tmp_path, cover):
         with pytest.raises(prolate.Error):
             cover.export(bad)
     assert (tmp_path / "mine.csv").read_text() == "mine"
+    cover.export(tmp_path / "mine.csv", force=True)
+    assert (tmp_path / "mine.csv").read_text().startswith("level,")
 
 
 @needs_command
@@ -72,11 +79,46 @@ def test_every_public_name_is_documented():
         assert name.startswith("__") or (thing.__doc__ and len(thing.__doc__) > 30), name
 
 
-@pytest.mark.skipif(sys.version_info < (3, 12), reason="isolated interpreters came with 3.12")
 def test_subinterpreters_are_refused():
+    code = f"import sys; sys.path[:] = {sys.path}; import prolate"
     program = (
         "try:\n    import _interpreters as x\nexcept ImportError:\n    import _xxsubinterpreters as x\n"
-        "i = x.create()\nprint(x.run_string(i, 'import prolate'))"
+        f"i = x.create()\nprint(x.run_string(i, {code!r}))"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
     assert "does not support loading in subinterpreters" in done.stdout + done.stderr
+
+
+@pytest.mark.skipif(not (shutil.which("cmake") and REQUIREMENTS.exists()), reason="no CMake, or no sources")
+@pytest.mark.parametrize("free", [0, 1])
+def test_free_threaded_python_is_refused_when_built(tmp_path, free):
+    (tmp_path / "sitecustomize.py").write_text(
+        f"import sysconfig; sysconfig.get_config_vars()['Py_GIL_DISABLED'] = {free}"
+    )
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\nPYTHONPATH={tmp_path} exec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    done = subprocess.run(
+        ["cmake", f"-DPython_EXECUTABLE={python}", "-P", REQUIREMENTS], capture_output=True, text=True, check=False
+    )
+    assert ("free-threaded" in done.stderr and done.returncode != 0) == bool(free)
+
+
+@needs_command
+def test_the_command_and_bake_have_the_same_options():
+    help_ = subprocess.run([_command._EXECUTABLE, "bake", "--help"], capture_output=True, text=True, check=True).stdout
+    known = {name.replace("-", "_") for name in re.findall(r"^ +(?:-\w,)?--([a-z-]+)", help_, re.MULTILINE)}
+    # Files, the console, and what bake_many() has.
+    known -= {"help", "quiet", "output", "report", "json", "force", "manifest", "cache", "rebake"}
+    assert set(inspect.signature(prolate.bake).parameters) == known | {"vertices", "faces", "progress"}
+
+
+@needs_command
+def test_pictures_and_exports_have_the_options_of_the_command():
+    for word, method, other in (
+        ("export", prolate.Tree.export, {"output", "format"}),
+        ("render", prolate.Tree.render, {"output", "mesh", "unit", "scale", "recentre", "weld", "no_shadow", "force"}),
+    ):
+        done = subprocess.run([_command._EXECUTABLE, word, "--help"], capture_output=True, text=True, check=True)
+        known = {name.replace("-", "_") for name in re.findall(r"^ +(?:-\w,)?--([a-z-]+)", done.stdout, re.MULTILINE)}
+        assert known - other - {"help", "quiet"} <= set(inspect.signature(method).parameters)

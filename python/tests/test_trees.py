@@ -192,6 +192,46 @@ def test_verify_proves_and_finds_what_is_missing(cover):
     assert not larger and larger.levels[-1].counterexample is not None
 
 
+def frame_mesh():
+    """A square frame, 2 x 2 x 0.5, with a hole of 1 x 1."""
+    corner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], float)
+    vertices = [(x, y, z) for z in (-0.25, 0.25) for size in (1, 0.5) for x, y in size * corner]
+    faces = []
+    for k in range(4):
+        n = (k + 1) % 4
+        for a, b, c, d in ((k, n, 8 + n, 8 + k), (4 + n, 4 + k, 12 + k, 12 + n), (8 + k, 8 + n, 12 + n, 12 + k),
+                           (n, k, 4 + k, 4 + n)):  # fmt: skip
+            faces += [(a, b, c), (a, c, d)]
+    return np.array(vertices), np.array(faces)
+
+
+def test_clearance_is_a_length_and_holes_stay_free():
+    mesh = frame_mesh()
+    near = prolate.bake(*box_mesh(), clearance="60cm", ellipsoids=9, quality="fast")
+    assert near.info.goal_reached and near.info.levels[-1].hausdorff_max <= 0.6
+    assert near.info.asked.ellipsoids == 9 and near.info.asked.distance == pytest.approx(60 / near.info.diagonal)
+    assert near.info.hole_radius is None
+    open_ = prolate.bake(*mesh, keep_holes=0.2, quality="fast")
+    assert open_.info.hole_radius >= 0.2 and open_.info.asked.keep_holes == pytest.approx(0.2)
+    proof = open_.verify(*mesh)
+    assert proof and proof.holes_kept and proof.blocked is None
+    ball = prolate.Sphere((0, 0, 0), 0.2)
+    path = np.array([[0, 0, z, 0, 0, 0, 1] for z in np.linspace(-1, 1, 9)])
+    assert (prolate.overlap(open_, path, ball) == prolate.Verdict.SEPARATED).all()
+    least, most = prolate.ball_range(2)
+    for wrong in ({"keep_holes": 1.01 * most}, {"fill": 0.99 * least}, {"keep_holes": 0.45}, {"clearance": 1e-9}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            prolate.bake(*mesh, quality="fast", **wrong)
+    assert prolate.least_clearance(2, "fast") == pytest.approx(10 * prolate.least_clearance(2))
+
+
+def test_what_a_ball_cannot_reach_is_filled():
+    vertices, faces = box_mesh(HALF_A)
+    shell = prolate.bake(vertices, faces[:-1], fill="60cm", ellipsoids=1, quality="fast")
+    assert shell.info.asked.fill == pytest.approx(0.6) and not shell.info.surface_mode
+    assert shell.info.volume == pytest.approx(8 * HALF_A.prod(), rel=0.2)
+
+
 def test_units_scales_and_origins_are_remembered():
     vertices, faces = box_mesh(HALF_A * 1000, (4e6, -3e6, 2e6))
     with pytest.raises(ValueError, match="recentre"):
@@ -220,6 +260,15 @@ def test_files(tmp_path):
         with pytest.raises(prolate.Error) as caught:
             prolate.load_mesh(tmp_path / bad)
         assert bad in str(caught.value)
+    odd = os.path.join(os.fsencode(tmp_path), b"\xff\xfe.etree")  # no UTF-8
+    tree.save(odd)
+    assert prolate.load(odd) == tree
+    os.rename(path, odd[:-5] + b"obj")
+    assert (prolate.load_mesh(odd[:-5] + b"obj", unit="cm").vertices == mesh.vertices).all()
+    with pytest.raises(prolate.Error, match="absent"):
+        prolate.load_mesh(odd[:-5] + b"absent.obj")
+    with pytest.raises(ValueError, match="path"):
+        prolate.load("a\0b")
     with pytest.raises(prolate.Error) as caught:
         tree.save(tmp_path / "no" / "folder.etree")
     assert caught.value.code == "io"
@@ -311,6 +360,11 @@ def test_other_threads_run_during_a_bake():
         ({"unit": "parsec"}, ValueError, "unit"),
         ({"scale": (1, 0, 1)}, ValueError, "scale"),
         ({"alpha": "a"}, TypeError, "alpha"),
+        ({"clearance": 0}, ValueError, "clearance"),
+        ({"clearance": "5 parsec"}, ValueError, "clearance"),
+        ({"keep_holes": "1m", "fill": "1m"}, ValueError, "keep_holes"),
+        ({"progress": 3}, TypeError, "progress"),
+        ({"recentre": np.zeros(2)}, TypeError, "recentre"),
     ],
 )
 def test_bad_options(change, error, match):
