@@ -26,7 +26,17 @@ from ._queries import (
 )
 from ._shapes import Box, Capsule, HalfSpace, Sphere
 from ._tree import Tree, load
-from ._world import World, WorldPairs, WorldVerdicts
+from ._world import (
+    EventKind,
+    World,
+    WorldContacts,
+    WorldDistances,
+    WorldHits,
+    WorldOverlaps,
+    WorldPairs,
+    WorldSweeps,
+    WorldVerdicts,
+)
 
 __version__ = "0.1.0"
 
@@ -43,6 +53,7 @@ __all__ = [
     "Distances",
     "Ellipsoids",
     "Error",
+    "EventKind",
     "HalfSpace",
     "Hits",
     "LevelInfo",
@@ -57,7 +68,12 @@ __all__ = [
     "TreeInfo",
     "Verdict",
     "World",
+    "WorldContacts",
+    "WorldDistances",
+    "WorldHits",
+    "WorldOverlaps",
     "WorldPairs",
+    "WorldSweeps",
     "WorldVerdicts",
     "__version__",
     "bake",

@@ -14,6 +14,9 @@ _Bytes = NDArray[np.uint8]
 _Index = NDArray[np.int64]
 _Progress = Optional[Callable[[str, float, int], object]]
 _Placement = Optional[tuple[tuple[float, float, float], tuple[float, float, float]]]
+_Ids = NDArray[np.uint64]
+_ContactArrays = tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, _Ids]
+_HitArrays = tuple[_Floats, _Floats, _Floats, _Index, _Index, _Bytes]
 _PairArrays = tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Bytes]
 
 class Tree:
@@ -35,12 +38,56 @@ class World:
     def __init__(self, slack: object) -> None: ...
     def __len__(self) -> int: ...
     def insert(
-        self, tree: object, pose: object, margin: object, layers: object, mask: object, order: object, /
+        self, shape: object, pose: object, parts: object, margin: object, layers: object, mask: object, order: object
     ) -> int: ...
-    def remove(self, id: object, /) -> None: ...
-    def move(self, ids: object, poses: object, order: object, /) -> None: ...
-    def pairs(self) -> tuple[NDArray[np.uint64], NDArray[np.bool_]]: ...
-    def collide(self, margin: object, threads: object, /) -> tuple[NDArray[np.uint64], _Bytes]: ...
+    def remove(self, id: object) -> None: ...
+    def move(self, ids: object, poses: object, order: object) -> None: ...
+    def refilter(self, id: object, layers: object, mask: object) -> None: ...
+    def body_of(self, id: object) -> int: ...
+    def part(self, id: object, i: object) -> int: ...
+    def pairs(self) -> tuple[_Ids, NDArray[np.bool_]]: ...
+    def collide(self, margin: object, max_level: object, budget: object, threads: object) -> tuple[_Ids, _Bytes]: ...
+    def distance(
+        self, tolerance: object, max_distance: object, budget: object, threads: object
+    ) -> tuple[_Ids, _PairArrays]: ...
+    def contacts(
+        self, margin: object, budget: object, threads: object
+    ) -> tuple[_Ids, _ContactArrays, _Bytes, _Ids, _Bytes]: ...
+    def raycast(
+        self,
+        origins: object,
+        directions: object,
+        radius: object,
+        max_t: object,
+        mask: object,
+        budget: object,
+        threads: object,
+    ) -> tuple[_Ids, _HitArrays, bool]: ...
+    def sweep(
+        self,
+        tree: object,
+        start: object,
+        end: object,
+        margin: object,
+        tolerance: object,
+        mask: object,
+        budget: object,
+        threads: object,
+        order: object,
+    ) -> tuple[_Ids, _PairArrays, _Floats, bool]: ...
+    def overlap_shapes(
+        self, shapes: object, margin: object, mask: object, budget: object, threads: object
+    ) -> tuple[_Index, _Ids]: ...
+    def overlap_tree(
+        self,
+        tree: object,
+        poses: object,
+        margin: object,
+        mask: object,
+        budget: object,
+        threads: object,
+        order: object,
+    ) -> tuple[_Index, _Ids]: ...
 
 def bake(
     vertices: object, faces: object, placement: _Placement, options: dict[str, object], progress: _Progress
@@ -112,7 +159,7 @@ def raycast(
     budget: object,
     threads: object,
     order: object,
-) -> tuple[tuple[_Floats, _Floats, _Floats, _Index, _Index, _Bytes], bool]: ...
+) -> tuple[_HitArrays, bool]: ...
 def overlap(
     tree: object,
     poses: object,
@@ -144,7 +191,7 @@ def ground_contacts(
     budget: object,
     threads: object,
     order: object,
-) -> tuple[tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, NDArray[np.uint64]], _Bytes]: ...
+) -> tuple[_ContactArrays, _Bytes]: ...
 def bounds(tree: object, poses: object, margin: object, order: object) -> tuple[_Floats, _Floats, bool]: ...
 def contacts(
     a: object,
@@ -156,7 +203,7 @@ def contacts(
     budget: object,
     threads: object,
     order: object,
-) -> tuple[tuple[_Index, _Floats, _Floats, _Floats, _Floats, _Index, NDArray[np.uint64]], _Bytes]: ...
+) -> tuple[_ContactArrays, _Bytes]: ...
 def signed_distance(
     tree: object, points: object, pose: object, max_distance: object, budget: object, threads: object, order: object
 ) -> tuple[tuple[_Floats, _Floats, _Floats, _Floats, _Index, _Index, _Bytes], bool]: ...

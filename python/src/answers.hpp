@@ -7,6 +7,7 @@
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/query.hpp>
+#include <prolate/raycast.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -67,6 +68,37 @@ struct PairArrays {
         return nb::make_tuple(to_numpy(std::move(lower), {n}), to_numpy(std::move(upper), {n}),
                               to_numpy(std::move(point_a), {n, 3}), to_numpy(std::move(point_b), {n, 3}),
                               to_numpy(std::move(normal), {n, 3}), to_numpy(std::move(verdict), {n}));
+    }
+};
+
+/// Arrays of where N rays hit.
+struct HitArrays {
+    size_t count;
+    std::unique_ptr<double[]> t, point, normal;
+    std::unique_ptr<int64_t[]> node, triangle;
+    std::unique_ptr<uint8_t[]> verdict;
+
+    explicit HitArrays(size_t n)
+        : count(n), t(new_array<double>(n)), point(new_array<double>(3 * n)), normal(new_array<double>(3 * n)),
+          node(new_array<int64_t>(n)), triangle(new_array<int64_t>(n)), verdict(new_array<uint8_t>(n)) {}
+
+    /// The ray from `o` along `d` ends at `o + at d`; `n` is the normal in the world.
+    void store(size_t i, const RaycastResult& r, double at, const double* o, const double* d, const Point& n) noexcept {
+        const bool hit = std::isfinite(r.t);
+        t[i] = at;
+        verdict[i] = static_cast<uint8_t>(r.verdict);
+        node[i] = hit ? int64_t{r.node} : -1;
+        triangle[i] = hit && r.triangle != kNoTriangle ? int64_t{r.triangle} : -1;
+        for (size_t k = 0; k < 3; ++k) {
+            point[3 * i + k] = hit ? o[k] + at * d[k] : std::numeric_limits<double>::quiet_NaN();
+            normal[3 * i + k] = hit ? n[k] : std::numeric_limits<double>::quiet_NaN();
+        }
+    }
+    nb::tuple take() {
+        const size_t n = count;
+        return nb::make_tuple(to_numpy(std::move(t), {n}), to_numpy(std::move(point), {n, 3}),
+                              to_numpy(std::move(normal), {n, 3}), to_numpy(std::move(node), {n}),
+                              to_numpy(std::move(triangle), {n}), to_numpy(std::move(verdict), {n}));
     }
 };
 

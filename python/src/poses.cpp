@@ -205,4 +205,14 @@ RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) n
     return {pose, 1.0001 * (std::sqrt(moved) + 2 * bent * reach) + 0x1p-46 * lengths};
 }
 
+RoundedMotion motion_in(const Frame& frame, const DoublePose& start, const DoublePose& end, double reach) noexcept {
+    const RoundedPose from = in_frame(frame, start, reach), to = in_frame(frame, end, reach);
+    // In between, a point is off by no more than at both ends together, the turn of at most pi between them included;
+    // motion_between() rounds once more, at most by as much.
+    const double rounding =
+        0x1p-22 * (reach + std::hypot(from.pose.translation.x, from.pose.translation.y, from.pose.translation.z) +
+                   std::hypot(to.pose.translation.x, to.pose.translation.y, to.pose.translation.z));
+    return {motion_between(from.pose, to.pose), 4 * (from.slack + to.slack) + rounding};
+}
+
 } // namespace prolate::python

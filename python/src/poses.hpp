@@ -8,6 +8,7 @@
 
 #include "python/src/arrays.hpp"
 
+#include <prolate/sweep.hpp>
 #include <prolate/types.hpp>
 
 #include <array>
@@ -86,5 +87,12 @@ struct RoundedPose {
     double slack;
 };
 RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) noexcept;
+
+/// A motion between two poses, rounded in `frame`, and by how much that moves any of its points at most.
+struct RoundedMotion {
+    Motion motion;
+    double slack;
+};
+RoundedMotion motion_in(const Frame& frame, const DoublePose& start, const DoublePose& end, double reach) noexcept;
 
 } // namespace prolate::python

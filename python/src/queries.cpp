@@ -62,21 +62,6 @@ nb::tuple distance_trees(nb::handle a, nb::handle poses_a, nb::handle b, nb::han
 
 // ---- sweep ----
 
-// A motion between two poses, rounded in `frame`, and by how much that moves any of its points at most.
-struct RoundedMotion {
-    Motion motion;
-    double slack;
-};
-RoundedMotion motion_in(const Frame& frame, const DoublePose& start, const DoublePose& end, double reach) noexcept {
-    const RoundedPose from = in_frame(frame, start, reach), to = in_frame(frame, end, reach);
-    // In between, a point is off by no more than at both ends together, the turn of at most pi between them included;
-    // motion_between() rounds once more, at most by as much.
-    const double rounding =
-        0x1p-22 * (reach + std::hypot(from.pose.translation.x, from.pose.translation.y, from.pose.translation.z) +
-                   std::hypot(to.pose.translation.x, to.pose.translation.y, to.pose.translation.z));
-    return {motion_between(from.pose, to.pose), 4 * (from.slack + to.slack) + rounding};
-}
-
 nb::tuple sweep_trees(nb::handle a, nb::handle start_a, nb::handle end_a, nb::handle b, nb::handle start_b,
                       nb::handle end_b, nb::handle margin, nb::handle tolerance, nb::handle max_level,
                       nb::handle budget, nb::handle threads, nb::handle order) {
@@ -119,6 +104,7 @@ struct PlacedRay {
     Pose pose;
     Ray ray;
     bool in_frame = false;
+    double scale = 1; ///< of the direction
 };
 // As given, if floats hold all of it; else taken into the body's frame in double precision and rounded there.
 PlacedRay placed_ray(const Poses& poses, size_t i, const double* origin, const double* direction) noexcept {
@@ -135,7 +121,7 @@ PlacedRay placed_ray(const Poses& poses, size_t i, const double* origin, const d
     const double scale = most > 1e-30 && most < 1e30 ? 1 : 1 / most; // floats hold the direction's length
     const Point local_origin = rotated_back(pose, {o[0] - pose.t[0], o[1] - pose.t[1], o[2] - pose.t[2]});
     const Point local_direction = rotated_back(pose, {d[0] * scale, d[1] * scale, d[2] * scale});
-    return {{}, {vec(local_origin), vec(local_direction)}, true};
+    return {{}, {vec(local_origin), vec(local_direction)}, true, scale};
 }
 
 nb::tuple raycast_tree(nb::handle tree, nb::handle pose, nb::handle origins, nb::handle directions, nb::handle radius,
@@ -152,34 +138,19 @@ nb::tuple raycast_tree(nb::handle tree, nb::handle pose, nb::handle origins, nb:
         if (direction.values[3 * i] == 0 && direction.values[3 * i + 1] == 0 && direction.values[3 * i + 2] == 0)
             value_error("directions[" + std::to_string(i) + "]", "is 0");
     const Limits limits(radius, max_level, budget, "radius");
-    const float most_t =
-        max_t.is_none() ? std::numeric_limits<float>::infinity() : rounded_up(number_from_0(max_t, "max_t"));
-    auto t = new_array<double>(count), point = new_array<double>(3 * count), normal = new_array<double>(3 * count);
-    auto node = new_array<int64_t>(count), triangle = new_array<int64_t>(count);
-    auto verdict = new_array<uint8_t>(count);
+    const double most_t = max_t.is_none() ? std::numeric_limits<double>::infinity() : number_from_0(max_t, "max_t");
+    HitArrays out(count);
     for_all(count, thread_count(threads), [&](size_t i, QueryContext& context) {
         const double* const o = &origin.values[3 * (origin.count == 1 ? 0 : i)];
         const double* const d = &direction.values[3 * (direction.count == 1 ? 0 : i)];
         PlacedRay at = placed_ray(poses, i, o, d);
-        at.ray.max_t = most_t;
+        at.ray.max_t = rounded_up(most_t / at.scale);
         const RaycastResult r = raycast(held.view, at.pose, at.ray, context, limits.options(0));
-        const bool hit = std::isfinite(r.t);
-        t[i] = r.t;
-        verdict[i] = static_cast<uint8_t>(r.verdict);
-        node[i] = hit ? int64_t{r.node} : -1;
-        triangle[i] = hit && r.triangle != kNoTriangle ? int64_t{r.triangle} : -1;
         const Point local = {r.normal.x, r.normal.y, r.normal.z};
-        const Point n = at.in_frame ? rotated(poses.at(i), local) : local;
-        for (size_t k = 0; k < 3; ++k) {
-            point[3 * i + k] = hit ? o[k] + r.t * d[k] : std::numeric_limits<double>::quiet_NaN();
-            normal[3 * i + k] = hit ? n[k] : std::numeric_limits<double>::quiet_NaN();
-        }
+        out.store(i, r, r.t * at.scale, o, d, at.in_frame ? rotated(poses.at(i), local) : local);
     });
     const bool single = poses.single() && origin.single && direction.single;
-    return nb::make_tuple(nb::make_tuple(to_numpy(std::move(t), {count}), to_numpy(std::move(point), {count, 3}),
-                                         to_numpy(std::move(normal), {count, 3}), to_numpy(std::move(node), {count}),
-                                         to_numpy(std::move(triangle), {count}), to_numpy(std::move(verdict), {count})),
-                          single);
+    return nb::make_tuple(out.take(), single);
 }
 
 } // namespace

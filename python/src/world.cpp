@@ -1,148 +1,152 @@
-// World: many bodies. One call at a time works on it, whatever threads call.
-#include "python/src/batch.hpp"
+// The bodies of a world.
+#include "python/src/world.hpp"
+
 #include "python/src/poses.hpp"
-#include "python/src/tree.hpp"
 
-#include <prolate/tbb.hpp>
-#include <prolate/world_queries.hpp>
-
-#include <mutex>
-#include <unordered_map>
+#include <cmath>
 
 namespace prolate::python {
 namespace {
 
-uint64_t number_of(BodyId id) {
-    return uint64_t{id.generation} << 32 | id.index;
+double slack_of(nb::handle slack) {
+    const double value = number_from_0(slack, "slack");
+    if (value > 1) value_error("slack", "must be 0 to 1");
+    return value;
 }
-BodyId id_of(uint64_t number) {
-    return {.index = static_cast<uint32_t>(number), .generation = static_cast<uint32_t>(number >> 32)};
+
+RoundedPose rounded(const Poses& poses, size_t i, double reach) {
+    if (poses.floats()) return {poses.floats()[poses.index(i)], 0};
+    return in_frame({}, poses.at(i), reach);
 }
 
-// The interpreter's lock is given up while it waits for the world's, and for the length of the work.
-class HeldWorld {
-    template <class Work> auto locked(Work&& work) {
-        const nb::gil_scoped_release released;
-        const std::lock_guard lock(mutex_);
-        return work();
-    }
+RoundedPose one_pose(nb::handle value, const char* name, nb::handle order, double reach) {
+    const Poses poses(value, name, order);
+    if (!poses.single()) value_error(name, "must be one pose");
+    return rounded(poses, 0, reach);
+}
 
-public:
-    explicit HeldWorld(nb::handle slack)
-        : world_(value_or_throw(World::create({.slack = static_cast<float>(slack_of(slack))}))) {}
+std::vector<BodyId> ids_of(nb::handle ids) {
+    const nb::object array = as_numpy(ids, "ids", "uint64");
+    const AnyArray view = import_array(array);
+    if (view.ndim() != 1) value_error("ids", "must have shape (N,), not " + view.shape_text());
+    std::vector<BodyId> out;
+    for (size_t i = 0; i < view.shape(0); ++i) out.push_back(id_of(static_cast<const uint64_t*>(view.data())[i]));
+    return out;
+}
 
-    uint64_t insert(nb::handle tree, nb::handle pose, nb::handle margin, nb::handle layers, nb::handle mask,
-                    nb::handle order) {
-        const HeldTree& held = tree_of(tree, "tree");
-        const Poses poses(pose, "pose", order);
-        if (!poses.single()) value_error("pose", "must be one pose");
-        const RoundedPose at = rounded(poses, 0, held.reach);
-        const Body body{.shape = held.view,
-                        .pose = at.pose,
-                        .layers = static_cast<uint32_t>(whole(layers, "layers", 0, UINT32_MAX)),
-                        .mask = static_cast<uint32_t>(whole(mask, "mask", 0, UINT32_MAX)),
-                        .margin = rounded_up(number_from_0(margin, "margin") + at.slack)};
-        const uint64_t id = number_of(value_or_throw(locked([&] { return world_.insert(body); })));
-        trees_.emplace(id, nb::borrow(tree));
-        return id;
-    }
-    void remove(nb::handle id) {
-        const uint64_t number = whole(id, "id", 0, UINT64_MAX);
-        check_done(locked([&] { return world_.remove(id_of(number)); }), "id " + std::to_string(number));
-        gone_.push_back(std::move(trees_[number])); // pairs name the body until they are updated
-        trees_.erase(number);
-    }
-    void move(nb::handle ids, nb::handle poses_, nb::handle order) {
-        const std::vector<BodyId> bodies = ids_of(ids);
-        const Poses poses(poses_, "poses", order);
-        if (poses.count() != bodies.size()) value_error("poses", "must be as many as ids");
-        std::vector<Pose> to(bodies.size());
-        for (size_t i = 0; i < to.size(); ++i) to[i] = rounded(poses, i, 0).pose;
-        const auto moved = locked([&] { return world_.move(bodies, to); });
-        if (!moved) throw Failure{moved.error(), "ids[" + std::to_string(moved.error().where) + "]"};
-    }
-    /// (ids (M, 2), begins (M,))
-    nb::tuple pairs() {
-        update();
-        const auto pairs = world_.pairs();
-        auto ids = new_array<uint64_t>(2 * pairs.size());
-        auto begins = new_array<bool>(pairs.size());
-        for (size_t i = 0; i < pairs.size(); ++i) {
-            ids[2 * i] = number_of(pairs[i].a), ids[2 * i + 1] = number_of(pairs[i].b);
-            begins[i] = pairs[i].begins;
-        }
-        return nb::make_tuple(to_numpy(std::move(ids), {pairs.size(), 2}), to_numpy(std::move(begins), {pairs.size()}));
-    }
-    /// (ids (M, 2), verdicts (M,))
-    nb::tuple collide(nb::handle margin, nb::handle threads) {
-        const QueryOptions options{.margin = rounded_up(number_from_0(margin, "margin"))};
-        const int workers = thread_count(threads);
-        update();
-        std::vector<CollideResult> results;
-        std::vector<uint64_t> ids;
-        check_done(locked([&] {
-            const auto pairs = world_.pairs();
-            results.resize(pairs.size());
-            for (const BodyPair& pair : pairs) ids.push_back(number_of(pair.a)), ids.push_back(number_of(pair.b));
-            oneapi::tbb::task_arena arena(workers);
-            const Jobs jobs = workers > 1 ? tbb_jobs(arena) : Jobs{};
-            const std::unique_ptr<QueryContext[]> contexts(new QueryContext[jobs.workers]);
-            return prolate::collide(world_, pairs, std::span(results), {{contexts.get(), jobs.workers}, jobs}, options);
-        }));
-        auto verdicts = new_array<uint8_t>(results.size());
-        for (size_t i = 0; i < results.size(); ++i) verdicts[i] = static_cast<uint8_t>(results[i].verdict);
-        return nb::make_tuple(to_numpy(ids, {results.size(), 2}), to_numpy(std::move(verdicts), {results.size()}));
-    }
-    uint32_t count() {
-        return locked([&] { return world_.body_count(); });
-    }
-
-private:
-    static double slack_of(nb::handle slack) {
-        const double value = number_from_0(slack, "slack");
-        if (value > 1) value_error("slack", "must be 0 to 1");
-        return value;
-    }
-    static RoundedPose rounded(const Poses& poses, size_t i, double reach) {
-        if (poses.floats()) return {poses.floats()[i], 0};
-        return in_frame({}, poses.at(i), reach);
-    }
-    static std::vector<BodyId> ids_of(nb::handle ids) {
-        const nb::object array = as_numpy(ids, "ids", "uint64");
-        const AnyArray view = import_array(array);
-        if (view.ndim() != 1) value_error("ids", "must have shape (N,), not " + view.shape_text());
-        std::vector<BodyId> out;
-        for (size_t i = 0; i < view.shape(0); ++i) out.push_back(id_of(static_cast<const uint64_t*>(view.data())[i]));
-        return out;
-    }
-    void update() {
-        const auto updated = locked([&]() -> Result<void> {
-            const auto pairs = world_.update_pairs();
-            if (!pairs) return pairs.error();
-            return {};
-        });
-        check_done(updated);
-        gone_.clear();
-    }
-
-    World world_;
-    std::mutex mutex_;
-    std::unordered_map<uint64_t, nb::object> trees_; ///< by the number of the body that they are of
-    std::vector<nb::object> gone_;
-};
+uint64_t id_number(nb::handle id) {
+    return whole(id, "id", 0, UINT64_MAX);
+}
 
 } // namespace
 
+uint64_t number_of(BodyId id) noexcept {
+    return uint64_t{id.generation} << 32 | id.index;
+}
+BodyId id_of(uint64_t number) noexcept {
+    return {.index = static_cast<uint32_t>(number), .generation = static_cast<uint32_t>(number >> 32)};
+}
+uint32_t bits_of(nb::handle value, const char* name) {
+    return static_cast<uint32_t>(whole(value, name, 0, UINT32_MAX));
+}
+
+HeldWorld::HeldWorld(nb::handle slack)
+    : world_(value_or_throw(World::create({.slack = static_cast<float>(slack_of(slack))}))) {}
+
+// `shape` is a tree, or the row of a half-space; `parts` a sequence of (tree, pose).
+uint64_t HeldWorld::insert(nb::handle shape, nb::handle pose, nb::handle parts_, nb::handle margin, nb::handle layers,
+                           nb::handle mask, nb::handle order) {
+    Body body{.shape = HalfSpace{}, .pose = {}, .layers = bits_of(layers, "layers"), .mask = bits_of(mask, "mask")};
+    std::vector<nb::object> trees;
+    std::vector<Part> parts;
+    double slack = 0;
+    if (nb::isinstance<HeldTree>(shape)) {
+        const HeldTree& held = tree_of(shape, "shape");
+        const RoundedPose at = one_pose(pose, "pose", order, held.reach);
+        body.shape = held.view;
+        body.pose = at.pose;
+        slack = at.slack;
+        trees.push_back(nb::borrow(shape));
+    } else {
+        const Rows<double> row = rows_of_doubles(shape, "shape", 4, true);
+        const double* const n = row.values.data();
+        body.shape =
+            HalfSpace{{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])}, rounded_up(n[3])};
+    }
+    for (const nb::handle part : parts_) {
+        const nb::object tree = part[0], local = part[1];
+        const HeldTree& held = tree_of(tree, "parts");
+        const RoundedPose at = one_pose(local, "parts", order, held.reach);
+        parts.push_back({held.view, at.pose});
+        slack = std::max(slack, at.slack);
+        trees.push_back(tree);
+    }
+    body.margin = rounded_up(number_from_0(margin, "margin") + slack);
+    if (!std::isfinite(body.margin)) value_error("margin", "must be finite");
+    const uint64_t id = number_of(value_or_throw(locked([&] { return world_.insert(body, parts); })));
+    trees_.emplace(id, std::move(trees));
+    return id;
+}
+
+void HeldWorld::remove(nb::handle id) {
+    const uint64_t number = id_number(id);
+    check_done(locked([&] { return world_.remove(id_of(number)); }), "id " + std::to_string(number));
+    trees_.erase(number);
+}
+
+void HeldWorld::move(nb::handle ids, nb::handle poses_, nb::handle order) {
+    const std::vector<BodyId> bodies = ids_of(ids);
+    const Poses poses(poses_, "poses", order);
+    if (poses.count() != bodies.size()) value_error("poses", "must be as many as ids");
+    std::vector<Pose> to(bodies.size());
+    for (size_t i = 0; i < to.size(); ++i) to[i] = rounded(poses, i, 0).pose;
+    const auto moved = locked([&] { return world_.move(bodies, to); });
+    if (!moved) throw Failure{moved.error(), "ids[" + std::to_string(moved.error().where) + "]"};
+}
+
+void HeldWorld::refilter(nb::handle id, nb::handle layers, nb::handle mask) {
+    const uint64_t number = id_number(id);
+    const uint32_t in = bits_of(layers, "layers"), meets = bits_of(mask, "mask");
+    check_done(locked([&] { return world_.refilter(id_of(number), in, meets); }), "id " + std::to_string(number));
+}
+
+uint64_t HeldWorld::body_of(nb::handle id) {
+    const uint64_t number = id_number(id);
+    return number_of(locked([&] { return world_.body_of(id_of(number)); }));
+}
+uint64_t HeldWorld::part(nb::handle id, nb::handle i) {
+    const uint64_t number = id_number(id);
+    const auto index = static_cast<uint32_t>(whole(i, "i", 0, UINT32_MAX));
+    return number_of(locked([&] { return world_.part(id_of(number), index); }));
+}
+uint32_t HeldWorld::count() {
+    return locked([&] { return world_.body_count(); });
+}
+
 void bind_world(nb::module_& m) {
+    const auto any = [](const char* name) { return nb::arg(name).none(); };
     nb::class_<HeldWorld>(m, "World")
-        .def(nb::init<nb::handle>(), nb::arg("slack").none())
-        .def("insert", &HeldWorld::insert, nb::arg("tree").none(), nb::arg("pose").none(), nb::arg("margin").none(),
-             nb::arg("layers").none(), nb::arg("mask").none(), nb::arg("order").none())
-        .def("remove", &HeldWorld::remove, nb::arg("id").none())
-        .def("move", &HeldWorld::move, nb::arg("ids").none(), nb::arg("poses").none(), nb::arg("order").none())
+        .def(nb::init<nb::handle>(), any("slack"))
+        .def("insert", &HeldWorld::insert, any("shape"), any("pose"), any("parts"), any("margin"), any("layers"),
+             any("mask"), any("order"))
+        .def("remove", &HeldWorld::remove, any("id"))
+        .def("move", &HeldWorld::move, any("ids"), any("poses"), any("order"))
+        .def("refilter", &HeldWorld::refilter, any("id"), any("layers"), any("mask"))
+        .def("body_of", &HeldWorld::body_of, any("id"))
+        .def("part", &HeldWorld::part, any("id"), any("i"))
+        .def("__len__", &HeldWorld::count)
         .def("pairs", &HeldWorld::pairs)
-        .def("collide", &HeldWorld::collide, nb::arg("margin").none(), nb::arg("threads").none())
-        .def("__len__", &HeldWorld::count);
+        .def("collide", &HeldWorld::collide, any("margin"), any("max_level"), any("budget"), any("threads"))
+        .def("distance", &HeldWorld::distance, any("tolerance"), any("max_distance"), any("budget"), any("threads"))
+        .def("contacts", &HeldWorld::contacts, any("margin"), any("budget"), any("threads"))
+        .def("raycast", &HeldWorld::raycast, any("origins"), any("directions"), any("radius"), any("max_t"),
+             any("mask"), any("budget"), any("threads"))
+        .def("sweep", &HeldWorld::sweep, any("tree"), any("start"), any("end"), any("margin"), any("tolerance"),
+             any("mask"), any("budget"), any("threads"), any("order"))
+        .def("overlap_shapes", &HeldWorld::overlap_shapes, any("shapes"), any("margin"), any("mask"), any("budget"),
+             any("threads"))
+        .def("overlap_tree", &HeldWorld::overlap_tree, any("tree"), any("poses"), any("margin"), any("mask"),
+             any("budget"), any("threads"), any("order"));
 }
 
 } // namespace prolate::python

@@ -65,7 +65,9 @@ shapes = st.one_of(
 lengths = st.floats(0, 3)
 few = st.integers(0, 3)
 USUAL = {
-    **dict.fromkeys(("poses", "poses_a", "poses_b", "pose", "start_a", "end_a", "start_b", "end_b"), pose),
+    **dict.fromkeys(
+        ("poses", "poses_a", "poses_b", "pose", "start_a", "end_a", "start_b", "end_b", "start", "end"), pose
+    ),
     **dict.fromkeys(("points", "origins", "directions"), points),
     **dict.fromkeys(("radius", "half_height", "diagonal", "longest_side", "margin", "tolerance", "slack"), lengths),
     **dict.fromkeys(("radii", "half"), st.just([1.0, 0.5, 0.25])),
@@ -75,6 +77,8 @@ USUAL = {
     "mesh": st.just(box_mesh(HALF_A)),
     "assets": st.lists(st.builds(prolate.Asset, st.tuples(vertices, faces), st.just({"exact": True})), max_size=2),
     "shape": shapes,
+    "what": st.one_of(shapes, st.lists(shapes, max_size=2), st.just(prolate.sphere_tree(0.5))),
+    "i": few,
     "pairs": st.just([[0, 0]]),
     "ids": st.just([1 << 32]),
     "budget": st.just(1000),
@@ -124,7 +128,9 @@ def functions(tree, world):
 SLOW = {"Tree.render": 25, "Tree.view": 6, "Tree.export": 25, "Tree.verify": 60, "bake": 120, "bake_many": 40}
 
 
-def usual(parameter, default):
+def usual(name, parameter, default):
+    if (name, parameter) == ("World.insert", "shape"):
+        return USUAL["b"]
     return USUAL.get(parameter, st.just(None if default is inspect.Parameter.empty else default))
 
 
@@ -136,9 +142,9 @@ def arguments(draw, name, parameters):
     out = {}
     for parameter, default in parameters.items():
         if parameter in wrong:
-            out[parameter] = draw(st.one_of(junk, usual(parameter, default)))
+            out[parameter] = draw(st.one_of(junk, usual(name, parameter, default)))
         elif default is inspect.Parameter.empty or parameter in always or draw(few) == 0:
-            out[parameter] = draw(usual(parameter, default))
+            out[parameter] = draw(usual(name, parameter, default))
     return out
 
 
