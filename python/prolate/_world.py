@@ -306,11 +306,16 @@ class World:
             return WorldOverlaps(*self._world.overlap_tree(what, poses, margin, mask, budget, threads, order))
         if poses is not None:
             raise TypeError("poses: only a Tree has poses here")
-        shapes = (what,) if isinstance(what, (Sphere, Capsule, Box)) else what
-        try:
-            rows = [numbers(shape) for shape in shapes]
-        except TypeError as error:
-            raise TypeError(f"what: {error}") from None
+        if isinstance(what, (Sphere, Capsule, Box)):
+            what = (what,)
+        elif not isinstance(what, Iterable):
+            raise TypeError(f"what: must be a Tree or shapes, not {type(what).__name__}")
+        rows = []
+        for i, shape in enumerate(what):
+            try:
+                rows.append(numbers(shape))
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"what[{i}]: {error}") from None
         return WorldOverlaps(*self._world.overlap_shapes(rows, margin, mask, budget, threads))
 
 
