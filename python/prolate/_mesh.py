@@ -131,14 +131,29 @@ def load_mesh(
 
 def arrays_of(mesh: Any) -> tuple[Any, Any]:
     """``(vertices, faces)`` of a mesh object of trimesh, Open3D or MeshLab."""
-    import numpy as np
-
     if isinstance(mesh, Mesh):
         return mesh.vertices, mesh.faces
     if isinstance(mesh, tuple):
         if len(mesh) != 2:
             raise TypeError(f"mesh: a tuple must be (vertices, faces), not of length {len(mesh)}")
         return mesh[0], mesh[1]
+    if hasattr(mesh, "geometry") and hasattr(mesh, "to_mesh"):
+        raise TypeError("mesh: is a scene; make one mesh of it with to_mesh()")
+    try:
+        arrays = _foreign(mesh)
+    except Exception as error:  # whatever other libraries raise, of a mesh without vertices, say
+        raise ValueError(f"mesh: {type(mesh).__name__} does not give its vertices and faces: {error}") from None
+    if arrays is None:
+        raise TypeError(
+            f"mesh: {type(mesh).__name__} has neither vertices and faces, nor what Open3D or MeshLab call them; "
+            "give (vertices, faces)"
+        )
+    return arrays
+
+
+def _foreign(mesh: Any) -> tuple[Any, Any] | None:
+    import numpy as np
+
     if hasattr(mesh, "current_mesh"):  # pymeshlab.MeshSet
         mesh = mesh.current_mesh()
     if hasattr(mesh, "vertex_matrix") and hasattr(mesh, "face_matrix"):  # pymeshlab.Mesh
@@ -149,12 +164,7 @@ def arrays_of(mesh: Any) -> tuple[Any, Any]:
         return np.asarray(mesh.vertices), np.asarray(mesh.triangles)
     if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):  # open3d.t.geometry.TriangleMesh
         return mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy()
-    if hasattr(mesh, "geometry") and hasattr(mesh, "to_mesh"):
-        raise TypeError("mesh: is a scene; make one mesh of it with to_mesh()")
-    raise TypeError(
-        f"mesh: {type(mesh).__name__} has neither vertices and faces, nor what Open3D or MeshLab call them; "
-        "give (vertices, faces)"
-    )
+    return None
 
 
 def placed(

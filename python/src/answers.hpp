@@ -83,7 +83,8 @@ struct HitArrays {
           node(new_array<int64_t>(n)), triangle(new_array<int64_t>(n)), verdict(new_array<uint8_t>(n)) {}
 
     /// The ray from `o` along `d` ends at `o + at d`; `n` is the normal in the world.
-    void store(size_t i, const RaycastResult& r, double at, const double* o, const double* d, const Point& n) noexcept {
+    void store(size_t i, const RaycastResult& r, double at, const double* o, const double* d,
+               const Point& n) const noexcept {
         const bool hit = std::isfinite(r.t);
         t[i] = at;
         verdict[i] = static_cast<uint8_t>(r.verdict);

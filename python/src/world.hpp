@@ -88,7 +88,7 @@ template <class Ask> void HeldWorld::ask(nb::handle threads, const Ask& ask_) {
         oneapi::tbb::task_arena arena(static_cast<int>(count));
         const Jobs jobs = count > 1 ? tbb_jobs(arena) : Jobs{};
         if (context_count_ < jobs.workers) {
-            contexts_.reset(new QueryContext[jobs.workers]);
+            contexts_ = std::make_unique_for_overwrite<QueryContext[]>(jobs.workers);
             context_count_ = jobs.workers;
         }
         return ask_(Workers{{contexts_.get(), context_count_}, jobs});
