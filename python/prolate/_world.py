@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Union
 
 from . import _core
@@ -281,7 +281,7 @@ class World:
 
     def overlap(
         self,
-        what: Tree | Probe | Iterable[Probe],
+        what: Tree | Probe | Sequence[Probe],
         poses: ArrayLike | None = None,
         *,
         margin: float = 0,
@@ -308,8 +308,8 @@ class World:
             raise TypeError("poses: only a Tree has poses here")
         if isinstance(what, (Sphere, Capsule, Box)):
             what = (what,)
-        elif not isinstance(what, Iterable):
-            raise TypeError(f"what: must be a Tree or shapes, not {type(what).__name__}")
+        elif not isinstance(what, (list, tuple)):
+            raise TypeError(f"what: must be a Tree, a shape or a list of shapes, not {type(what).__name__}")
         rows = []
         for i, shape in enumerate(what):
             try:
