@@ -18,12 +18,14 @@ Slab plane_of(const TreeView& tree, uint32_t triangle) noexcept {
     const double b[3] = {double{r.x} - p.x, double{r.y} - p.y, double{r.z} - p.z};
     const double n[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
     const double length = std::sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
-    return {{n[0] / length, n[1] / length, n[2] / length}, {p.x, p.y, p.z}, 0, 0};
+    const double scale = tree.scale();
+    return {{n[0] / length, n[1] / length, n[2] / length}, {scale * p.x, scale * p.y, scale * p.z}, 0, 0};
 }
 
 Slab slab_of(const TreeView& tree, const std::byte* record) noexcept {
     Slab slab = plane_of(tree, load_le<uint32_t>(record + kHullPlane));
-    slab.low = double{load_le<float>(record + kHullLow)}, slab.high = double{load_le<float>(record + kHullHigh)};
+    const double scale = tree.scale();
+    slab.low = scale * load_le<float>(record + kHullLow), slab.high = scale * load_le<float>(record + kHullHigh);
     return slab;
 }
 

@@ -25,6 +25,8 @@ struct Slab {
 };
 inline constexpr double kSlabRounding = 0x1p-49;
 
+// Of a scaled tree, the normal is that of the triangle as stored, to the bit: the heights were measured along it.
+
 /// Does a hull record have a slab?
 bool has_slab(const std::byte* record) noexcept;
 

@@ -4,11 +4,13 @@
 #include "src/bytes.hpp"
 #include "src/format.hpp"
 #include "src/layout.hpp"
+#include "src/power_of_two.hpp"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cmath>
 
 namespace prolate {
 namespace {
@@ -24,6 +26,23 @@ Place place_of(const TreeView& tree, uint32_t slot) {
 }
 
 } // namespace
+
+Result<TreeView> TreeView::scaled(float scale) const noexcept {
+    const auto size = [](const Ellipsoid& e) { // bounds all coordinates
+        double sum = 0;
+        for (const float x : {e.center.x, e.center.y, e.center.z, e.l11, e.l21, e.l22, e.l31, e.l32, e.l33})
+            sum += std::abs(double{x});
+        return sum;
+    };
+    const double step = power_of_two(raw_.lattice_.step_exponent) * scale;
+    if (!(scale > 0 && step >= power_of_two(format::kMinStepExponent) &&
+          step <= power_of_two(format::kMaxStepExponent) &&
+          std::max(size(root_), size(root_bound_)) * scale <= double{kLargestCoordinate}))
+        return Error{ErrorCode::bad_options, "a scale must be above 0, and keep the tree in the format's range", 0};
+    TreeView out = *this;
+    out.raw_.lattice_.scale = scale;
+    return out;
+}
 
 uint32_t TreeView::degree() const noexcept {
     return load_le<uint16_t>(bytes_.data() + kAtDegree);

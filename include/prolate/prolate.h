@@ -122,6 +122,10 @@ typedef struct prolate_tree_info {
 } prolate_tree_info;
 PROLATE_API prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info* info);
 
+/** tree.hpp: TreeView::scaled(). The same bytes, seen `scale` times as large. `scaled` may be `tree`. */
+PROLATE_API prolate_status prolate_tree_scale(const prolate_tree* tree, float scale, prolate_tree* scaled,
+                                              prolate_error* error);
+
 /** primitives.hpp. Their bytes go into `buffer` as with prolate_tree_load(); prolate_primitive_size() is enough but for
  * large polyhedra. `triangles`: three indices each. */
 PROLATE_API size_t prolate_primitive_size(void);
@@ -175,6 +179,19 @@ typedef struct prolate_collide_result {
 PROLATE_API prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
                                            const prolate_query_options* options, prolate_pair_cache* cache,
                                            prolate_collide_result* result);
+
+typedef struct prolate_collide_all_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    bool enclosed;
+    uint64_t found; /**< all of them; the first `capacity` are written */
+    prolate_stats stats;
+} prolate_collide_all_result;
+/** collide.hpp: collide_all(). `pairs` has room for `capacity`, and may be NULL if that is 0. */
+PROLATE_API prolate_status prolate_collide_all(prolate_body a, prolate_body b, prolate_meeting_pair* pairs,
+                                               size_t capacity, void* scratch, size_t scratch_size,
+                                               const prolate_query_options* options,
+                                               prolate_collide_all_result* result);
 
 /** distance.hpp: DistanceOptions. 0 of max_distance and max_tests means no limit, of tolerances the default. */
 typedef struct prolate_distance_options {
@@ -272,7 +289,29 @@ typedef struct prolate_half_space {
     prolate_vec3 normal;
     float offset;
 } prolate_half_space;
-/** half_space.hpp: distance() and contacts(). */
+/** shapes.hpp: Sphere (center `a`), Capsule (from `a` to `b`), Box (`half` at `a`, turned by `rotation`), HalfSpace
+ * (normal `a`, offset `radius`). A shape has no use for the other numbers. */
+typedef int32_t prolate_shape_kind;
+enum { PROLATE_SPHERE = 0, PROLATE_CAPSULE = 1, PROLATE_BOX = 2, PROLATE_HALF_SPACE = 3 };
+typedef struct prolate_shape {
+    prolate_shape_kind kind;
+    prolate_vec3 a, b, half;
+    prolate_quat rotation;
+    float radius;
+} prolate_shape;
+typedef struct prolate_overlap_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    bool enclosed;
+    uint32_t node, triangle;
+    prolate_stats stats;
+} prolate_overlap_result;
+/** shapes.hpp: overlap(). */
+PROLATE_API prolate_status prolate_overlap(prolate_body body, const prolate_shape* shape, void* scratch,
+                                           size_t scratch_size, const prolate_query_options* options,
+                                           prolate_overlap_result* result);
+
+/** half_space.hpp: distance(), contacts() and sweep(). */
 PROLATE_API prolate_status prolate_half_space_distance(prolate_body body, prolate_half_space half_space, void* scratch,
                                                        size_t scratch_size, const prolate_distance_options* options,
                                                        prolate_distance_result* result);
@@ -280,6 +319,11 @@ PROLATE_API prolate_status prolate_half_space_contacts(prolate_body body, prolat
                                                        prolate_manifolds* manifolds, void* scratch, size_t scratch_size,
                                                        const prolate_query_options* options,
                                                        prolate_contact_result* result);
+
+PROLATE_API prolate_status prolate_half_space_sweep(const prolate_tree* tree, prolate_motion motion,
+                                                    prolate_half_space half_space, void* scratch, size_t scratch_size,
+                                                    const prolate_sweep_options* options,
+                                                    prolate_sweep_result* result);
 
 /** points.hpp: SignedDistance, of many points. */
 typedef struct prolate_signed_distance {
@@ -298,6 +342,24 @@ PROLATE_API prolate_status prolate_contains(prolate_body body, const prolate_vec
 
 /** bounds.hpp: bounds(). */
 PROLATE_API prolate_status prolate_bounds(prolate_body body, float margin, prolate_box3* box);
+
+/** types.hpp: Ellipsoid. */
+typedef struct prolate_ellipsoid {
+    prolate_vec3 center;
+    float l11, l21, l22, l31, l32, l33;
+} prolate_ellipsoid;
+/** pairs.hpp: PairDistance. */
+typedef struct prolate_pair_distance {
+    float lower, upper;
+    prolate_vec3 normal, point_a, point_b;
+} prolate_pair_distance;
+/** pairs.hpp: collide() and distance() of two single ellipsoids. They need no scratch. */
+PROLATE_API prolate_status prolate_pair_collide(const prolate_ellipsoid* a, prolate_pose pose_a,
+                                                const prolate_ellipsoid* b, prolate_pose pose_b, float margin,
+                                                prolate_verdict* verdict);
+PROLATE_API prolate_status prolate_pair_distance_of(const prolate_ellipsoid* a, prolate_pose pose_a,
+                                                    const prolate_ellipsoid* b, prolate_pose pose_b, float tolerance,
+                                                    prolate_pair_distance* distance);
 
 /* ---- worlds ---- */
 
@@ -319,6 +381,13 @@ typedef struct prolate_jobs {
     uint32_t workers;
 } prolate_jobs;
 
+/** poses.hpp: collide_poses(), the verdicts alone. One of the counts may be 1, for one pose at all of the other's;
+ * `verdicts` has room for the larger. `scratch` holds workers * prolate_scratch_size() bytes. `jobs` may be NULL. */
+PROLATE_API prolate_status prolate_collide_poses(const prolate_tree* a, const prolate_pose* poses_a, size_t count_a,
+                                                 const prolate_tree* b, const prolate_pose* poses_b, size_t count_b,
+                                                 const prolate_jobs* jobs, void* scratch, size_t scratch_size,
+                                                 const prolate_query_options* options, prolate_verdict* verdicts);
+
 typedef struct prolate_body_id {
     uint32_t index, generation;
 } prolate_body_id;
@@ -333,14 +402,22 @@ typedef struct prolate_world_options {
     uint32_t size, version;
     float slack;
 } prolate_world_options;
+/** world.hpp: Part. */
+typedef struct prolate_part {
+    const prolate_tree* tree; /**< its bytes must outlive the body */
+    prolate_pose pose;        /**< in the body's frame */
+} prolate_part;
 /** A body of a world: world.hpp, Body. */
 typedef struct prolate_world_body {
     uint32_t size, version;
-    const prolate_tree* tree; /**< its bytes must outlive the body */
+    const prolate_tree* tree; /**< its bytes must outlive the body; NULL of a half-space */
     prolate_pose pose;
     uint64_t user;
     uint32_t layers, mask; /**< if both are 0: in layer 1, and meets all */
     float margin;
+    const prolate_half_space* half_space; /**< or NULL. Of a body there is either this or a tree */
+    const prolate_part* parts;            /**< more trees of the body, or NULL */
+    size_t part_count;                    /**< at most 65535 */
 } prolate_world_body;
 
 /** `allocator`: NULL for malloc(). Destroy the world with prolate_world_destroy(), which takes NULL, too. */
@@ -352,14 +429,99 @@ PROLATE_API prolate_status prolate_world_insert(prolate_world* world, const prol
                                                 prolate_body_id* id);
 PROLATE_API prolate_status prolate_world_remove(prolate_world* world, prolate_body_id id);
 PROLATE_API prolate_status prolate_world_move(prolate_world* world, prolate_body_id id, prolate_pose pose);
+/** World::move() of many. `where` of the error is the index of the offence. */
+PROLATE_API prolate_status prolate_world_move_many(prolate_world* world, const prolate_body_id* ids,
+                                                   const prolate_pose* poses, size_t count, const prolate_jobs* jobs,
+                                                   prolate_error* error);
+PROLATE_API prolate_status prolate_world_refilter(prolate_world* world, prolate_body_id id, uint32_t layers,
+                                                  uint32_t mask);
+/** World::find(): the pose and the user's number of a body or part. Either may be NULL. */
+PROLATE_API prolate_status prolate_world_find(const prolate_world* world, prolate_body_id id, prolate_pose* pose,
+                                              uint64_t* user);
+/** World::body_of() and World::part(). PROLATE_BAD_ID where these have no answer. */
+PROLATE_API prolate_status prolate_world_body_of(const prolate_world* world, prolate_body_id part,
+                                                 prolate_body_id* body);
+PROLATE_API prolate_status prolate_world_part(const prolate_world* world, prolate_body_id body, uint32_t i,
+                                              prolate_body_id* part);
 /** World::update_pairs(): *pairs are `count` pairs, which are valid until the next call. `jobs` may be NULL: serial. */
 PROLATE_API prolate_status prolate_world_update_pairs(prolate_world* world, const prolate_jobs* jobs,
                                                       const prolate_body_pair** pairs, size_t* count);
-/** World::collide(): verdicts[i] of pairs[i]. `scratch` holds workers * prolate_scratch_size() bytes. */
+/** World::ended_pairs() and World::slot_count(). */
+PROLATE_API prolate_status prolate_world_ended_pairs(const prolate_world* world, const prolate_body_pair** pairs,
+                                                     size_t* count);
+PROLATE_API prolate_status prolate_world_slot_count(const prolate_world* world, uint32_t* count);
+
+/** Who works on the queries of a world below: world_queries.hpp, Workers. `scratch` holds workers *
+ * prolate_scratch_size() bytes, aligned to 64. */
+typedef struct prolate_workers {
+    const prolate_jobs* jobs; /**< or NULL: serial */
+    void* scratch;
+    size_t scratch_size;
+} prolate_workers;
+
+/** world_queries.hpp: collide(), the verdicts alone: verdicts[i] of pairs[i]. */
 PROLATE_API prolate_status prolate_world_collide(const prolate_world* world, const prolate_body_pair* pairs,
-                                                 size_t count, const prolate_jobs* jobs, void* scratch,
-                                                 size_t scratch_size, const prolate_query_options* options,
-                                                 prolate_verdict* verdicts);
+                                                 size_t count, const prolate_workers* workers,
+                                                 const prolate_query_options* options, prolate_verdict* verdicts);
+/** world_queries.hpp: distance(). */
+typedef struct prolate_distance_answer {
+    double lower, upper;
+    prolate_vec3 point_a, point_b, normal;
+    prolate_verdict verdict;
+    bool enclosed;
+} prolate_distance_answer;
+PROLATE_API prolate_status prolate_world_distance(const prolate_world* world, const prolate_body_pair* pairs,
+                                                  size_t count, const prolate_workers* workers,
+                                                  const prolate_distance_options* options,
+                                                  prolate_distance_answer* answers);
+
+/** world_queries.hpp: PairContacts. Set to 0 before its first use. */
+typedef struct prolate_pair_contacts {
+    prolate_body_id a, b;
+    prolate_verdict verdict;
+    bool enclosed;
+    uint64_t found;
+    prolate_stats stats;
+    bool touching, reported;
+    prolate_manifolds manifolds;
+} prolate_pair_contacts;
+/** world_queries.hpp: contacts(). `records`: prolate_world_slot_count() of them. */
+PROLATE_API prolate_status prolate_world_contacts(const prolate_world* world, const prolate_body_pair* pairs,
+                                                  size_t count, const prolate_workers* workers,
+                                                  const prolate_query_options* options, prolate_pair_contacts* records,
+                                                  size_t record_count);
+/** world_queries.hpp: ContactEvent, contact_events(). */
+enum { PROLATE_CONTACT_BEGAN = 0, PROLATE_CONTACT_STAYS = 1, PROLATE_CONTACT_ENDED = 2 };
+typedef struct prolate_contact_event {
+    prolate_body_id a, b;
+    uint32_t slot;
+    uint8_t kind;
+} prolate_contact_event;
+PROLATE_API prolate_status prolate_world_contact_events(const prolate_world* world, prolate_pair_contacts* records,
+                                                        size_t record_count, prolate_contact_event* events,
+                                                        size_t capacity, size_t* count);
+
+/** world_queries.hpp: RayHit, raycast(). Of bodies that have a layer in `mask`. */
+typedef struct prolate_ray_hit {
+    prolate_body_id body;
+    prolate_verdict verdict;
+    double t, clear;
+    prolate_vec3 point, normal;
+    uint32_t node, triangle;
+} prolate_ray_hit;
+PROLATE_API prolate_status prolate_world_raycast(const prolate_world* world, const prolate_ray* rays, size_t count,
+                                                 uint32_t mask, const prolate_workers* workers,
+                                                 const prolate_query_options* options, prolate_ray_hit* hits);
+/** world_queries.hpp: overlap() with one sphere, capsule or box. *found is their number; the lowest `capacity` of the
+ * ids are written. */
+PROLATE_API prolate_status prolate_world_overlap(const prolate_world* world, const prolate_shape* shape, uint32_t mask,
+                                                 const prolate_workers* workers, const prolate_query_options* options,
+                                                 prolate_body_id* ids, size_t capacity, size_t* found);
+/** world_queries.hpp: sweep() of one tree, from outside. *body is what it hits first, if anything. */
+PROLATE_API prolate_status prolate_world_sweep(const prolate_world* world, const prolate_tree* tree,
+                                               prolate_motion motion, uint32_t mask, const prolate_workers* workers,
+                                               const prolate_sweep_options* options, prolate_body_id* body,
+                                               prolate_sweep_result* result);
 
 #ifdef __cplusplus
 }

@@ -79,6 +79,14 @@ public:
     /// Fails with bad_file or newer_version; `where` is the byte offset of the first offence. Allocates nothing.
     static Result<TreeView> open(std::span<const std::byte> bytes, const OpenOptions& options = {}) noexcept;
 
+    /// The same tree, but queries see it `scale` times as large as it is stored, about its frame's origin: as
+    /// certified, because products of two floats are exact in double precision. A power of two costs no bit of any
+    /// answer. It is a view of the same bytes. Fails with bad_options if `scale` is not finite and above 0, or the tree
+    /// would leave the format's range (src/FORMAT.md, "Known limits").
+    Result<TreeView> scaled(float scale) const noexcept;
+    /// What queries multiply all lengths by; 1 unless it comes from scaled(). All numbers below are as stored.
+    float scale() const noexcept { return raw_.lattice().scale; }
+
     uint32_t node_count() const noexcept { return node_count_; }
     uint32_t block_count() const noexcept { return block_count_; }
     /// All slots are below this: kBlockLanes * block_count(). The root's slot is 0.

@@ -41,7 +41,8 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, do
 
 // The bodies are certainly so far apart, by spheres around their roots; NaN if the pose is not finite.
 double gap_of_spheres(const TreeView& a, const TreeView& b, const query::RelativePose& b_to_a) {
-    const query::PlacedEllipsoid root_a = query::place(a.root_bound()), root_b = query::place(b.root_bound());
+    const query::PlacedEllipsoid root_a = query::place(a.root_bound(), a.scale()),
+                                 root_b = query::place(b.root_bound(), b.scale());
     const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
     return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
            query::kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
@@ -107,7 +108,8 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     };
     double moved = 0, smaller = 0;
     if (cache) {
-        const query::PlacedEllipsoid root_a = query::place(a.root_bound()), root_b = query::place(b.root_bound());
+        const query::PlacedEllipsoid root_a = query::place(a.root_bound(), a.scale()),
+                                     root_b = query::place(b.root_bound(), b.scale());
         smaller = std::min(root_a.size, root_b.size);
         if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b.reach);
         if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)

@@ -124,10 +124,13 @@ bool CollideSearch::meets(const MeetingPair& pair) noexcept {
             return distance == 0 ? separated(x, y) : query::distance(x, y).lower > distance;
         };
         if (in_a)
-            return triangle_separated(place(a.tree, pair.triangle_a), place(b.tree.ellipsoid(pair.node_b), b_to_a));
+            return triangle_separated(place(a.tree, pair.triangle_a),
+                                      place(b.tree.ellipsoid(pair.node_b), b.tree.scale(), b_to_a));
         if (in_b)
-            return triangle_separated(place(b.tree, pair.triangle_b, b_to_a), place(a.tree.ellipsoid(pair.node_a)));
-        const auto x = place(a.tree.ellipsoid(pair.node_a)), y = place(b.tree.ellipsoid(pair.node_b), b_to_a);
+            return triangle_separated(place(b.tree, pair.triangle_b, b_to_a),
+                                      place(a.tree.ellipsoid(pair.node_a), a.tree.scale()));
+        const auto x = place(a.tree.ellipsoid(pair.node_a), a.tree.scale()),
+                   y = place(b.tree.ellipsoid(pair.node_b), b.tree.scale(), b_to_a);
         return separated(x, y, distance);
     });
 }

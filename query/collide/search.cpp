@@ -243,8 +243,7 @@ private:
 
     // options.margin + skin in lattice steps, rounded up.
     float margin_in(const Side& side) const {
-        return static_cast<float>((double{s_.options.margin} + s_.skin) * kRoundUp *
-                                  power_of_two(-side.lattice.step_exponent));
+        return static_cast<float>((double{s_.options.margin} + s_.skin) * kRoundUp * steps_per_metre(side.lattice));
     }
     static constexpr double kRoundUp = 1 + 0x1p-20; // also pays for the rounding of margin |n|
 

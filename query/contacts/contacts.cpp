@@ -43,7 +43,8 @@ constexpr double kFarther = 0x1p-6, kFartherOut = 0x1p-10;
 constexpr double kSlack = 0.25; // of a depth: the normals of curved bodies are means, and no exact ones
 
 double smaller_size(const CollideSearch& search) {
-    return std::min(place(search.a.tree.root()).size, place(search.b.tree.root()).size);
+    return std::min(place(search.a.tree.root(), search.a.tree.scale()).size,
+                    place(search.b.tree.root(), search.b.tree.scale()).size);
 }
 
 class Collector {

@@ -1,5 +1,6 @@
 #include "query/contacts/node_pair.hpp"
 
+#include "query/triangle/placed.hpp"
 #include "query/triangle/support.hpp"
 #include "src/block.hpp"
 #include "src/bytes.hpp"
@@ -23,7 +24,7 @@ constexpr double kParallel = 1 - 1e-6; // cosine
 // In its tree's frame; 0 if it is not flat.
 dvec3 normal_of(const NodeWithHull& at) {
     if (!at.tree.has_triangles()) return dvec3(0);
-    const double thin = kFlat * place(at.tree.bound(at.node)).size;
+    const double thin = kFlat * place(at.tree.bound(at.node), at.tree.scale()).size;
     const auto normal = [](const Slab& slab) { return dvec3(slab.normal[0], slab.normal[1], slab.normal[2]); };
     if (at.hull != nullptr) {
         if (!has_slab(at.hull)) return dvec3(0);
@@ -34,7 +35,7 @@ dvec3 normal_of(const NodeWithHull& at) {
     const Slab plane = plane_of(at.tree, range.first);
     for (uint32_t t = range.first + 1; t < range.first + range.count; ++t)
         for (const uint32_t v : at.tree.triangle(t)) {
-            const Vec3 p = at.tree.vertex(v);
+            const dvec3 p = position(at.tree, v);
             const double x[] = {p.x, p.y, p.z};
             if (!(std::abs(plane.height(x)) <= thin)) return dvec3(0);
         }
@@ -47,7 +48,7 @@ Extent extent_of(const NodeWithHull& at, const dvec3& d) {
         const TriangleRange range = at.tree.triangles(at.node);
         return {-triangle_support(at.tree, range, -d), triangle_support(at.tree, range, d)};
     }
-    const PlacedEllipsoid e = place(at.tree.bound(at.node));
+    const PlacedEllipsoid e = place(at.tree.bound(at.node), at.tree.scale());
     const dvec3 v = d * e.factor;
     const double middle = glm::dot(d, e.center), half = glm::length(v);
     const uint8_t share = at.hull != nullptr ? load_le<uint8_t>(at.hull + kHullShare) : 0;

@@ -170,8 +170,8 @@ Contact PairContacts::last_resort(const MeetingPair& pair) noexcept {
 double PairContacts::overlap(const dvec3& n, uint32_t& vertex_a, uint32_t& vertex_b, double enough) const {
     Climb a{&hills_a_, n, vertex_a, vertex_a, kClimbSteps},
         b{&hills_b_, -(n * s_.b_to_a.rotation), vertex_b, vertex_b, kClimbSteps};
-    const dvec3 at_a = to_double(s_.a.tree.vertex(vertex_a)),
-                at_b = s_.b_to_a.rotation * to_double(s_.b.tree.vertex(vertex_b)) + s_.b_to_a.translation;
+    const dvec3 at_a = position(s_.a.tree, vertex_a),
+                at_b = s_.b_to_a.rotation * position(s_.b.tree, vertex_b) + s_.b_to_a.translation;
     double sum = glm::dot(n, at_a - at_b);
     while (sum <= enough && a.steps_left > 0) sum += a.step();
     while (sum <= enough && b.steps_left > 0) sum += b.step();
@@ -244,7 +244,7 @@ DeepestContacts PairContacts::deepest(const Patch& patch, const dvec3& n) noexce
 void PairContacts::add_depth_of(uint32_t vertex, bool of_a, const MeetingPair& pair, const dvec3& n, double most,
                                 DeepestContacts& out) {
     const dvec3 up = of_a ? n : -n;
-    const dvec3 here = to_double((of_a ? s_.a : s_.b).tree.vertex(vertex));
+    const dvec3 here = position((of_a ? s_.a : s_.b).tree, vertex);
     const dvec3 at = of_a ? here : s_.b_to_a.rotation * here + s_.b_to_a.translation;
     // Cast in the other body's frame, against `up`.
     const RelativePose a_to_b = inverse(s_.b_to_a);

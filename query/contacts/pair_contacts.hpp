@@ -72,9 +72,11 @@ public:
 private:
     PlacedTriangle triangle_a(const MeetingPair& pair) const { return place(s_.a.tree, pair.triangle_a); }
     PlacedTriangle triangle_b(const MeetingPair& pair) const { return place(s_.b.tree, pair.triangle_b, s_.b_to_a); }
-    PlacedEllipsoid ellipsoid_a(const MeetingPair& pair) const { return place(s_.a.tree.ellipsoid(pair.node_a)); }
+    PlacedEllipsoid ellipsoid_a(const MeetingPair& pair) const {
+        return place(s_.a.tree.ellipsoid(pair.node_a), s_.a.tree.scale());
+    }
     PlacedEllipsoid ellipsoid_b(const MeetingPair& pair) const {
-        return place(s_.b.tree.ellipsoid(pair.node_b), s_.b_to_a);
+        return place(s_.b.tree.ellipsoid(pair.node_b), s_.b.tree.scale(), s_.b_to_a);
     }
     Surrounded surrounded_a(uint32_t triangle) const;
     Surrounded surrounded_b(uint32_t triangle) const;

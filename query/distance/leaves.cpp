@@ -37,7 +37,8 @@ DistanceSearch::DistanceSearch(const OrderedBodies<Pose>& bodies, QueryContext& 
       entries(context.entries), triangle_reach_(triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
-    const PlacedEllipsoid x = place(search.a.tree.bound(0)), y = place(search.b.tree.bound(0), search.b_to_a);
+    const PlacedEllipsoid x = place(search.a.tree.bound(0), search.a.tree.scale()),
+                          y = place(search.b.tree.bound(0), search.b.tree.scale(), search.b_to_a);
     const double bound = glm::length(y.center - x.center) - x.size - y.size - kSeparationMargin * (x.reach + y.reach);
     return bound > 0 ? bound : 0;
 }
@@ -65,8 +66,8 @@ bool DistanceSearch::decide(uint32_t node_a, uint32_t node_b, double bound) noex
     if (in_a.count > 0 && in_b.count > 0) return decide_triangles(node_a, node_b, in_a, in_b, bound), true;
     const bool triangles_in_a = in_a.count > 0;
     const TriangleRange range = triangles_in_a ? in_a : in_b;
-    const PlacedEllipsoid ellipsoid =
-        triangles_in_a ? place(b.tree.ellipsoid(node_b), b_to_a) : place(a.tree.ellipsoid(node_a));
+    const PlacedEllipsoid ellipsoid = triangles_in_a ? place(b.tree.ellipsoid(node_b), b.tree.scale(), b_to_a)
+                                                     : place(a.tree.ellipsoid(node_a), a.tree.scale());
     for (uint32_t t = range.first; t < range.first + range.count && !overlapping; ++t) {
         const PlacedTriangle triangle = triangles_in_a ? place(a.tree, t) : place(b.tree, t, b_to_a);
         TriangleDistance found = distance(triangle, ellipsoid);
@@ -79,7 +80,8 @@ bool DistanceSearch::decide(uint32_t node_a, uint32_t node_b, double bound) noex
 }
 
 void DistanceSearch::decide_ellipsoids(uint32_t node_a, uint32_t node_b, double bound) noexcept {
-    const PlacedEllipsoid x = place(a.tree.ellipsoid(node_a)), y = place(b.tree.ellipsoid(node_b), b_to_a);
+    const PlacedEllipsoid x = place(a.tree.ellipsoid(node_a), a.tree.scale()),
+                          y = place(b.tree.ellipsoid(node_b), b.tree.scale(), b_to_a);
     const bool meet = !separated(x, y);
     const double wanted = meet || !(upper < kInfinity) ? 0 : kOfTolerance * tolerance(upper);
     Gap gap = distance_of(x, y, wanted, normal);

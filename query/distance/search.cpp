@@ -47,8 +47,8 @@ namespace {
 // One of the two trees, as that whose children are tested.
 struct DistanceSide : Side<PlacedNodeWithBox> {
     DistanceSide(const TreeSide& side, const LatticePose& other_to_here)
-        : Side(side, other_to_here), step(power_of_two(lattice.step_exponent)),
-          per_step(power_of_two(-lattice.step_exponent)), triangles(tree.raw().triangles()),
+        : Side(side, other_to_here), step(step_of(lattice)), per_step(steps_per_metre(lattice)),
+          triangles(tree.raw().triangles()),
           triangle_bytes(static_cast<uint32_t>(3 * index_bytes(tree.vertex_count()))) {
         std::fill(skipped, skipped + kBlockLanes, DistanceSearch::kInfinity);
     }

@@ -58,7 +58,7 @@ double growth_to_hold(const query::PlacedEllipsoid& outer, const dmat3& to_ball,
 void node_growth(const TreeView& tree, std::span<float> growth) noexcept {
     std::fill(growth.begin(), growth.end(), 1.0f);
     tree.for_each_node([&](uint32_t node) {
-        const query::PlacedEllipsoid outer = query::place(tree.ellipsoid(node));
+        const query::PlacedEllipsoid outer = query::place(tree.ellipsoid(node), tree.scale());
         const dmat3 to_ball = glm::inverse(outer.factor);
         double most = 1;
         for (uint32_t first = node, end = node + 1; first < end;) {
@@ -66,7 +66,8 @@ void node_growth(const TreeView& tree, std::span<float> growth) noexcept {
             for (uint32_t below = first; below < end; ++below) {
                 if (!tree.is_node(below)) continue;
                 if (below != node)
-                    most = std::max(most, growth_to_hold(outer, to_ball, query::place(tree.ellipsoid(below))));
+                    most = std::max(most,
+                                    growth_to_hold(outer, to_ball, query::place(tree.ellipsoid(below), tree.scale())));
                 const ChildRange children = tree.children(below);
                 if (children.count == 0) continue;
                 if (next_end == 0) next_first = children.first;

@@ -50,14 +50,22 @@ RelativePose inverse(const RelativePose& pose) noexcept {
 }
 
 PlacedEllipsoid place(const Ellipsoid& e) noexcept {
-    PlacedEllipsoid out{to_double(e.center), factor_of(e), 0, 0};
+    return place(e, 1.0);
+}
+
+PlacedEllipsoid place(const Ellipsoid& e, double scale) noexcept {
+    PlacedEllipsoid out{to_double(e.center) * scale, factor_of(e) * scale, 0, 0};
     out.size = frobenius(out.factor);
     out.reach = glm::length(out.center) + out.size;
     return out;
 }
 
 PlacedEllipsoid place(const Ellipsoid& e, const RelativePose& b_to_a) noexcept {
-    PlacedEllipsoid out = place(e);
+    return place(e, 1.0, b_to_a);
+}
+
+PlacedEllipsoid place(const Ellipsoid& e, double scale, const RelativePose& b_to_a) noexcept {
+    PlacedEllipsoid out = place(e, scale);
     out.reach += b_to_a.distance;
     out.center = b_to_a.rotation * out.center + b_to_a.translation;
     out.factor = b_to_a.rotation * out.factor;
@@ -68,9 +76,8 @@ double support(const PlacedEllipsoid& e, const dvec3& n) noexcept {
     return glm::dot(n, e.center) + glm::length(n * e.factor);
 }
 
-PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept {
-    const dvec3 exact = to_double(p);
-    return {to_frame.rotation * exact + to_frame.translation, glm::length(exact) + to_frame.distance};
+PlacedPoint place(const dvec3& p, const RelativePose& to_frame) noexcept {
+    return {to_frame.rotation * p + to_frame.translation, glm::length(p) + to_frame.distance};
 }
 
 } // namespace prolate::query

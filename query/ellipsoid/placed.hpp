@@ -39,6 +39,9 @@ struct PlacedEllipsoid {
 };
 PlacedEllipsoid place(const Ellipsoid& e) noexcept;                             // of body A
 PlacedEllipsoid place(const Ellipsoid& e, const RelativePose& b_to_a) noexcept; // of body B
+/// The same, of a tree of this scale, a float: the products are exact.
+PlacedEllipsoid place(const Ellipsoid& e, double scale) noexcept;
+PlacedEllipsoid place(const Ellipsoid& e, double scale, const RelativePose& b_to_a) noexcept;
 /// The greatest n.x of its points x.
 double support(const PlacedEllipsoid& e, const glm::dvec3& n) noexcept;
 
@@ -47,6 +50,9 @@ struct PlacedPoint {
     glm::dvec3 position;
     double reach; // all lengths that went into it: its share of S
 };
-PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept;
+PlacedPoint place(const glm::dvec3& p, const RelativePose& to_frame) noexcept;
+inline PlacedPoint place(const Vec3& p, const RelativePose& to_frame) noexcept {
+    return place(to_double(p), to_frame);
+}
 
 } // namespace prolate::query

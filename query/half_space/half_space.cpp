@@ -37,7 +37,8 @@ class Touching {
 public:
     Touching(HeightSearch& search, double margin, const LastContacts& last)
         : s_(search), last_(last), touched_(moved(search.shape, margin)),
-          same_point(kSamePoint * place(search.side.tree.root()).size), patch(-search.shape.normal) {
+          same_point(kSamePoint * place(search.side.tree.root(), search.side.tree.scale()).size),
+          patch(-search.shape.normal) {
         std::fill(std::begin(seen_), std::end(seen_), kNoTriangle);
         s_.user = this;
         s_.leaf = [](void* self, uint32_t slot) { return static_cast<Touching*>(self)->leaf(slot); };
@@ -64,7 +65,7 @@ private:
         if (std::max(range.count, 1u) > s_.left()) return false;
         s_.stats.triangle_tests += std::max(range.count, 1u);
         if (range.count == 0) {
-            const PlacedEllipsoid e = place(tree.bound(slot));
+            const PlacedEllipsoid e = place(tree.bound(slot), tree.scale());
             if (!separated(e, touched_))
                 add(lowest_point(e, s_.shape.normal), {Part::Kind::node, slot, 0}, slot, kNoTriangle);
         }
@@ -98,7 +99,7 @@ private:
     }
     bool wanted(uint32_t slot, double bound) const {
         if (patch.empty()) return true;
-        const PlacedEllipsoid e = place(s_.side.tree.bound(slot));
+        const PlacedEllipsoid e = place(s_.side.tree.bound(slot), s_.side.tree.scale());
         const auto extent = [&](const dvec3& d) {
             const double middle = glm::dot(d, e.center), half = glm::length(d * e.factor);
             return Extent{middle - half, middle + half};
@@ -155,7 +156,8 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
         return out;
     }
     query::HeightSearch search(tree, shape, context, options);
-    search.limit = options.margin + query::kSeparationMargin * (shape.reach + query::place(tree.bound(0)).reach) * 4;
+    search.limit =
+        options.margin + query::kSeparationMargin * (shape.reach + query::place(tree.bound(0), tree.scale()).reach) * 4;
     query::Touching touching(search, options.margin, last);
     query::traverse(search);
     out.found = touching.found;

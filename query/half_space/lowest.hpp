@@ -48,7 +48,7 @@ private:
         if (std::max(range.count, 1u) > s_.left()) return false;
         s_.stats.triangle_tests += std::max(range.count, 1u);
         if (range.count == 0) {
-            const PlacedEllipsoid e = place(s_.side.tree.bound(slot));
+            const PlacedEllipsoid e = place(s_.side.tree.bound(slot), s_.side.tree.scale());
             consider(lowest_point(e, s_.shape.normal), e.reach, !separated(e, s_.shape),
                      {slot, 0, kNoTriangle, kNoTriangle});
         }

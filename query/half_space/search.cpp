@@ -30,7 +30,7 @@ class HeightTraversal {
 
 public:
     explicit HeightTraversal(HeightSearch& search)
-        : s_(search), stack_(search.stack), step_(power_of_two(search.side.lattice.step_exponent)) {}
+        : s_(search), stack_(search.stack), step_(step_of(search.side.lattice)) {}
 
     void run() {
         if (!test(0, 1)) return stop(-HUGE_VAL);

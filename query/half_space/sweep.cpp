@@ -50,10 +50,11 @@ public:
         : tree_(tree), context_(context), options_(sound(options)), start_(to_double(motion.start.translation)),
           motion_(motion, at_rest(motion.start.translation)),
           ground_(place(half_space, {motion.start.translation, {}}, 0)) {
-        const PlacedEllipsoid bound = place(tree.bound(0));
+        const PlacedEllipsoid bound = place(tree.bound(0), tree.scale());
         const MovingBody& body = motion_.a();
         reach_ = bound.reach + ground_.reach + motion_.at(1).b_to_a.distance;
-        const double asked = options_.tolerance > 0 ? options_.tolerance : kTolerance * place(tree.root()).size;
+        const double asked =
+            options_.tolerance > 0 ? options_.tolerance : kTolerance * place(tree.root(), tree.scale()).size;
         const double tolerance = std::max(asked, kLeastTolerance * (1 + body.speed()) * reach_);
         target_ = options_.margin + tolerance / 2, reached_ = options_.margin + tolerance;
         const double lever = glm::distance(bound.center, body.center()) + bound.size;

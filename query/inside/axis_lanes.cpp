@@ -11,7 +11,7 @@ float ray_slack(const float origin[3], const float span[3], double reach) noexce
 }
 
 LatticePoint lattice_point(const PlacedPoint& point, const LatticeInfo& lattice) noexcept {
-    const double per_step = power_of_two(-lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice);
     LatticePoint out{};
     double reach = point.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {

@@ -1,5 +1,7 @@
 #include "query/inside/crossing.hpp"
 
+#include "query/triangle/placed.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -92,8 +94,7 @@ int64_t crossings(const TreeView& tree, const TriangleRange& triangles, const dv
     if (direction.negative) std::swap(x, y);
     const double sign = direction.negative ? -1 : 1;
     const auto corner = [&](uint32_t v) {
-        const Vec3 p = tree.vertex(v);
-        const dvec3 d = dvec3(p.x, p.y, p.z) - origin;
+        const dvec3 d = position(tree, v) - origin;
         return dvec3(d[x], d[y], sign * d[z]);
     };
     int64_t sum = 0;

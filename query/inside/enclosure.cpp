@@ -2,6 +2,7 @@
 
 #include "query/inside/inside.hpp"
 #include "query/node/lattice.hpp"
+#include "query/triangle/placed.hpp"
 #include "src/block_box.hpp"
 
 #include <glm/vector_relational.hpp>
@@ -19,9 +20,10 @@ public:
         if (!outer_.has_triangles() || outer_.surface_mode() || a_sample_is_outside()) return Verdict::separated;
         Verdict verdict = Verdict::separated;
         for (uint32_t v = 0; v < inner_.component_count() && verdict == Verdict::separated; ++v)
-            verdict = look(inner_.vertex(v));
+            verdict = look(position(inner_, v));
         for (uint32_t n = 0; n < inner_.slot_count() && !inner_.has_triangles() && verdict == Verdict::separated; ++n)
-            if (inner_.is_node(n) && inner_.is_leaf(n)) verdict = look(inner_.ellipsoid(n).center);
+            if (inner_.is_node(n) && inner_.is_leaf(n))
+                verdict = look(to_double(inner_.ellipsoid(n).center) * double{inner_.scale()});
         return verdict;
     }
 
@@ -32,7 +34,7 @@ private:
         constexpr uint32_t kSamples = 8;
         if (inner_.component_count() != 1) return false;
         const LatticeInfo lattice = outer_.raw().lattice();
-        const double step = power_of_two(lattice.step_exponent);
+        const double step = step_of(lattice);
         const BlockBoxes boxes(outer_.raw().block(0));
         glm::dvec3 low, high; // metres, exact
         for (size_t i = 0; i < 3; ++i) {
@@ -42,7 +44,7 @@ private:
         }
         for (uint32_t i = 0; i < kSamples; ++i) {
             const auto v = static_cast<uint32_t>(uint64_t{inner_.vertex_count()} * i / kSamples);
-            const PlacedPoint p = place(inner_.vertex(v), to_outer_);
+            const PlacedPoint p = place(position(inner_, v), to_outer_);
             const glm::dvec3 slack(kSeparationMargin * p.reach);
             if (glm::any(glm::lessThan(p.position, low - slack)) ||
                 glm::any(glm::greaterThan(p.position, high + slack)))
@@ -50,7 +52,7 @@ private:
         }
         return false;
     }
-    Verdict look(const Vec3& p) const {
+    Verdict look(const glm::dvec3& p) const {
         const auto winding = winding_number(outer_, place(p, to_outer_), stats_, most_tests_);
         return !winding ? Verdict::undecided : *winding != 0 ? Verdict::overlapping : Verdict::separated;
     }

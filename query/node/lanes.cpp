@@ -86,7 +86,7 @@ Single place(const std::byte* block, uint32_t lane, const LatticePose& pose, Pla
 }
 
 Single place(const PlacedEllipsoid& ellipsoid, const LatticeInfo& lattice) noexcept {
-    const double per_step = power_of_two(-lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice);
     Single s{};
     double reach = ellipsoid.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {

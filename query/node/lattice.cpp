@@ -7,7 +7,7 @@ namespace prolate::query {
 
 LatticePose lattice_pose(const RelativePose& from_to, const LatticeInfo& from, const LatticeInfo& to) noexcept {
     constexpr double kLargestCenter = 65535 * 1.7320508075688773;
-    const double step_from = power_of_two(from.step_exponent), per_step_to = power_of_two(-to.step_exponent);
+    const double step_from = step_of(from), per_step_to = steps_per_metre(to);
     const double scale = step_from * per_step_to;
     const double from_origin[] = {double(from.origin[0]), double(from.origin[1]), double(from.origin[2])};
     const double to_origin[] = {double(to.origin[0]), double(to.origin[1]), double(to.origin[2])};

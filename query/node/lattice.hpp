@@ -1,9 +1,10 @@
 // The frames that queries work in: lattice coordinates of a tree, x = metres / step - origin, in which the centers of
-// its nodes are as stored, 32nds from 0 to 65535. Steps are powers of two, so lengths change frames without rounding.
+// its nodes are as stored, 32nds from 0 to 65535, whatever the tree's scale. Steps are powers of two, or of a scaled
+// tree such a one times a float; then lengths are rounded once more in double precision.
 #pragma once
 
 #include "query/ellipsoid/placed.hpp"
-#include "src/power_of_two.hpp"
+#include "src/lattice.hpp"
 
 #include <prolate/tree.hpp>
 

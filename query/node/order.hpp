@@ -51,6 +51,8 @@ OrderedBodies<Placement> in_canonical_order(const TreeView& a, const Placement& 
     const auto order = [&] {
         constexpr size_t kHeader = 256;
         if (const auto by_header = compare(a, b, kHeader); by_header != 0) return by_header;
+        if (a.scale() != b.scale())
+            return a.scale() < b.scale() ? std::strong_ordering::less : std::strong_ordering::greater;
         if (const auto by_start = compare(start_of(place_a), start_of(place_b)); by_start != 0) return by_start;
         if (const auto by_bytes = compare(a, b, SIZE_MAX); by_bytes != 0) return by_bytes;
         return compare(place_a, place_b);

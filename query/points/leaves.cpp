@@ -16,7 +16,7 @@
 #include "query/ellipsoid/nearest_direction.hpp"
 #include "query/ellipsoid/separation.hpp"
 #include "query/triangle/placed.hpp"
-#include "src/power_of_two.hpp"
+#include "src/lattice.hpp"
 #include "src/symmetric3.hpp"
 
 #include <glm/geometric.hpp>
@@ -32,7 +32,7 @@ using glm::dmat3;
 using glm::dvec3;
 
 LatticeProbe probe_of(const PlacedPoint& point, const LatticeInfo& lattice) {
-    const double per_step = power_of_two(-lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice);
     LatticeProbe out{};
     double reach = point.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {
@@ -110,11 +110,11 @@ PointSearch::PointSearch(const TreeView& tree, const PlacedPoint& placed, QueryC
       max_tests(most_tests), stack(context.entries) {}
 
 double PointSearch::metres(float square) const noexcept {
-    return std::sqrt(double{square}) * power_of_two(side.lattice.step_exponent) * (1 - 0x1p-50);
+    return std::sqrt(double{square}) * step_of(side.lattice) * (1 - 0x1p-50);
 }
 
 float PointSearch::square_of(double metres) const noexcept {
-    const double steps = metres * power_of_two(-side.lattice.step_exponent);
+    const double steps = metres * steps_per_metre(side.lattice);
     return static_cast<float>(steps * steps * (1 + 0x1p-20)); // infinite if too large
 }
 
@@ -161,7 +161,7 @@ void NearestSearch::try_triangle(uint32_t slot, uint32_t t, double bound) noexce
 
 void NearestSearch::try_ellipsoid(uint32_t slot, double bound) noexcept {
     ++stats.triangle_tests;
-    const PlacedEllipsoid e = place(side.tree.ellipsoid(slot));
+    const PlacedEllipsoid e = place(side.tree.ellipsoid(slot), side.tree.scale());
     const dvec3 x = point.position - e.center;
     const double slack = kSeparationMargin * (point.reach + e.reach);
     const dvec3 u = in_ball(e.factor, x);
@@ -226,7 +226,7 @@ Depth depth_in(const dmat3& factor, const dvec3& x, double slack) {
 bool DepthSearch::leaf(uint32_t slot, double) noexcept {
     if (left() < 1) return false;
     ++stats.triangle_tests;
-    const PlacedEllipsoid e = place(side.tree.ellipsoid(slot));
+    const PlacedEllipsoid e = place(side.tree.ellipsoid(slot), side.tree.scale());
     const double slack = kSeparationMargin * (point.reach + e.reach);
     const dvec3 x = point.position - e.center;
     const dvec3 u = in_ball(e.factor, x);

@@ -30,7 +30,7 @@ public:
         : tree_(tree), to_tree_(relative_pose(pose, Pose{})), to_world_(relative_pose(Pose{}, pose)), context_(context),
           max_tests_(options.max_pair_tests), max_distance_(sound_length(options.max_distance)),
           ellipsoids_(!tree.has_triangles() && !tree.bake_info().exact), surface_mode_(tree.surface_mode()),
-          reach_(place(tree.bound(0)).reach) {}
+          reach_(place(tree.bound(0), tree.scale()).reach) {}
 
     SignedDistance signed_distance(const Vec3& p) {
         const PlacedPoint point = place(p, to_tree_);

@@ -7,8 +7,9 @@
 // so an inexact n costs tightness, never correctness. It is taken towards the nearest point of the triangle: of the
 // edges, or of the face where that lies above its inside.
 //
-// Rounding, u = 2^-24. A corner less the leaf's first one is rounded once, what lies between that and the point once,
-// and their sum once: each coordinate is wrong by at most 4 u m, m the largest of all coordinates. n.v loses 3 u |n|_1
+// Rounding, u = 2^-24. A corner less the leaf's first one is rounded once, and once more by a scale of the tree, what
+// lies between that and the point once, and their sum once: each coordinate is wrong by at most 6 u m, m the largest of
+// all coordinates. n.v loses 3 u |n|_1
 // m more, and kPointLaneMargin, 32 u, is taken off. The quotient and the root lose less than 2^-20 of it. All is scaled
 // by the power of two that brings m into [1/2, 1), so nothing overflows; and an n whose square may have lost digits to
 // underflow claims nothing.

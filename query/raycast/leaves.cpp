@@ -19,7 +19,8 @@ bool RaycastSearch::meet(uint32_t at) noexcept {
         return hit_within(double{options.margin}, still_open, leaf);
     };
     if (triangles.count == 0 || growth)
-        return take(hit_by(place(growth ? side.tree.ellipsoid(at) : side.tree.bound(at))), kNoTriangle);
+        return take(hit_by(place(growth ? side.tree.ellipsoid(at) : side.tree.bound(at), side.tree.scale())),
+                    kNoTriangle);
     bool taken = false;
     stats.triangle_tests += triangles.count;
     for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)

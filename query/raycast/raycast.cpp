@@ -14,7 +14,7 @@ namespace prolate::query {
 namespace {
 
 LatticeRay to_lattice(const PlacedRay& ray, const LatticeInfo& lattice, double thickness) {
-    const double per_step = power_of_two(-lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice);
     double origin[3], span[3], reach = ray.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {
         const auto g = static_cast<glm::length_t>(i);
@@ -41,7 +41,7 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Query
     options.margin = std::min(options.margin, std::numeric_limits<float>::max()); // an infinite one would make NaNs
     RaycastResult out;
     const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
-    query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.bound(0));
+    query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.bound(0), tree.scale());
     if (growth) root.size *= double{growth[0]}, root.reach *= double{growth[0]};
     const query::PlacedRay placed = query::place(ray, to_frame, root, options.margin);
     if (!placed.valid) return out;

@@ -12,7 +12,7 @@ constexpr double kLeastExtent = 0x1p-10;
 } // namespace
 
 LaneRoundedBox lane_rounded_box(const RoundedBox& box, const LatticeInfo& lattice) noexcept {
-    const double per_step = power_of_two(-lattice.step_exponent), step = power_of_two(lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice), step = step_of(lattice);
     PlacedEllipsoid about{};
     about.center = box.center, about.reach = box.reach;
     for (glm::length_t i = 0; i < 3; ++i)
@@ -37,7 +37,7 @@ LaneRoundedBox lane_rounded_box(const RoundedBox& box, const LatticeInfo& lattic
 }
 
 LaneHalfSpace lane_half_space(const PlacedHalfSpace& half_space, const LatticeInfo& lattice) noexcept {
-    const double per_step = power_of_two(-lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice);
     LaneHalfSpace out{};
     double offset = half_space.offset * per_step, reach = half_space.reach * per_step;
     for (size_t i = 0; i < 3; ++i) {

@@ -29,7 +29,8 @@ template <class Shape, class LaneShape> struct ShapeSearch {
             ++result.stats.triangle_tests;
             if (!separated(place(side.tree, t), shape)) return take(leaf, t);
         }
-        return triangles.count == 0 && !separated(place(side.tree.ellipsoid(leaf)), shape) && take(leaf, kNoTriangle);
+        return triangles.count == 0 && !separated(place(side.tree.ellipsoid(leaf), side.tree.scale()), shape) &&
+               take(leaf, kNoTriangle);
     }
     /// Takes what meets the shape. Always true.
     bool take(uint32_t node, uint32_t triangle) noexcept {

@@ -102,7 +102,7 @@ void store(const dvec3& v, float (&out)[3]) {
     for (size_t i = 0; i < 3; ++i) out[i] = static_cast<float>(v[static_cast<glm::length_t>(i)]);
 }
 dvec3 on_lattice(const dvec3& metres, const LatticeInfo& lattice) {
-    const double per_step = std::ldexp(1.0, -lattice.step_exponent);
+    const double per_step = steps_per_metre(lattice);
     return metres * per_step - dvec3(lattice.origin[0], lattice.origin[1], lattice.origin[2]);
 }
 float length_up(const dvec3& v) {
@@ -119,7 +119,7 @@ MotionFrame frame(const LatticePose& y_to_x, const LatticeInfo& lattice, const d
                   const dvec3& spin_y, const dvec3& center_x, const dvec3& center_y) {
     MotionFrame out{};
     out.y_to_x = y_to_x;
-    const dvec3 in_steps = velocity * std::ldexp(1.0, -lattice.step_exponent), center = on_lattice(center_y, lattice);
+    const dvec3 in_steps = velocity * steps_per_metre(lattice), center = on_lattice(center_y, lattice);
     store(in_steps, out.velocity), store(spin_x, out.spin_x), store(spin_y, out.spin_y);
     store(on_lattice(center_x, lattice), out.center_x);
     out.speed = length_up(in_steps), out.spin_x_length = length_up(spin_x), out.spin_y_length = length_up(spin_y);
@@ -134,7 +134,8 @@ SweepSearch::SweepSearch(const OrderedBodies<Motion>& bodies, QueryContext& cont
     : a(tree_side(bodies.a, sweep_options.max_level)), b(tree_side(bodies.b, sweep_options.max_level)),
       motion(bodies.place_a, bodies.place_b), options(sound(sweep_options)), entries(context.entries) {
     move_to(0);
-    const PlacedEllipsoid x = place(a.tree.root()), y = place(b.tree.root(), now.b_to_a);
+    const PlacedEllipsoid x = place(a.tree.root(), a.tree.scale()),
+                          y = place(b.tree.root(), b.tree.scale(), now.b_to_a);
     const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);
     const double turned = motion.a().speed() + motion.b().speed();
     const double tolerance = std::max({asked, kLeastOfSizes * (x.size + y.size),
@@ -221,8 +222,10 @@ double SweepSearch::advance(uint32_t node_a, uint32_t node_b, bool as_covers) no
     const TriangleRange in_a = as_covers ? TriangleRange{} : a.tree.triangles(node_a),
                         in_b = as_covers ? TriangleRange{} : b.tree.triangles(node_b);
     const dvec3 center_a = motion.a().center(), center_b = now.center_b;
-    const auto ellipsoid_a = [&] { return EllipsoidPiece(place(a.tree.bound(node_a)), center_a); };
-    const auto ellipsoid_b = [&] { return EllipsoidPiece(place(b.tree.bound(node_b), now.b_to_a), center_b); };
+    const auto ellipsoid_a = [&] { return EllipsoidPiece(place(a.tree.bound(node_a), a.tree.scale()), center_a); };
+    const auto ellipsoid_b = [&] {
+        return EllipsoidPiece(place(b.tree.bound(node_b), b.tree.scale(), now.b_to_a), center_b);
+    };
     double least = horizon - time;
     dvec3 n(0);
     if (in_a.count == 0 && in_b.count == 0) {

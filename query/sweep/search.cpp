@@ -171,7 +171,7 @@ private:
         out.one_size = one.size;
         s_.stats.pair_tests += end - begin, ++s_.stats.block_tests;
         side.deepest = std::max(side.deepest, first + end - 1);
-        const double target = std::ldexp(s_.target, -exponent);
+        const double target = s_.target * steps_per_metre(side.lattice);
         for (uint32_t i = begin; i < end; ++i) {
             const double lengths = one.reach + one.size + double{kLargestCenter} + out.bounds.size[i];
             out.gap[i] = out.bounds.lower[i] - target - s_.now.slack * lengths;

@@ -18,7 +18,7 @@ using glm::dvec3;
 // A point in lattice coordinates of a tree, for tests against nodes' boxes.
 class BoxProbe {
 public:
-    BoxProbe(const LatticeInfo& lattice, const Vec3& p) {
+    BoxProbe(const LatticeInfo& lattice, const Vec3& p) { // as stored
         const double per_step = power_of_two(-lattice.step_exponent);
         const float metres[3] = {p.x, p.y, p.z};
         for (size_t i = 0; i < 3; ++i) at_[i] = double{metres[i]} * per_step - lattice.origin[i];
@@ -48,7 +48,7 @@ private:
 } // namespace
 
 double Hills::height(uint32_t vertex, const dvec3& up) const noexcept {
-    return glm::dot(up, to_double(tree_.vertex(vertex)));
+    return glm::dot(up, to_double(tree_.vertex(vertex))) * double{tree_.scale()};
 }
 
 // Calls visit(corners) for each triangle that has this vertex.

@@ -33,7 +33,7 @@ constexpr size_t kFour = 4;
 // One to four triangles of a leaf, one a lane; row 3 i + k is coordinate k of corner i.
 class FourTriangles {
 public:
-    FourTriangles(const TreeView& tree, uint32_t first, uint32_t count) : count_(count) {
+    FourTriangles(const TreeView& tree, uint32_t first, uint32_t count) : count_(count), tree_scale_(tree.scale()) {
         if (tree.vertex_count() <= 0x10000)
             gather<uint16_t>(tree, first);
         else
@@ -41,9 +41,10 @@ public:
         for (size_t k = 0; k < 3; ++k) origin_[k] = rows_[k][0];
     }
     uint32_t count() const { return count_; }
-    glm::dvec3 first_corner() const { return {origin_[0], origin_[1], origin_[2]}; }
-    /// As they stand, less the first corner's: coordinate row % 3 of corner row / 3, of the lanes from `i` on.
-    Quad from_first(size_t row, size_t i) const { return at(row, i) - origin_[row % 3]; }
+    glm::dvec3 first_corner() const { return glm::dvec3(origin_[0], origin_[1], origin_[2]) * double{tree_scale_}; }
+    /// As they stand, less the first corner's: coordinate row % 3 of corner row / 3, of the lanes from `i` on. A scale
+    /// of the tree that is no power of two rounds it once more.
+    Quad from_first(size_t row, size_t i) const { return stored_from_first(row, i) * tree_scale_; }
 
     /// Places the corners by x - first corner. Each lane of the result is the greatest of some of the coordinates.
     Quad place() {
@@ -57,9 +58,12 @@ public:
         Quad most = broadcast<Quad>(0);
         for (size_t i = 0; i < kFour; i += kQuadLanes)
             for (size_t corner = 0; corner < 9; corner += 3) {
-                const Quad x = from_first(corner, i), y = from_first(corner + 1, i), z = from_first(corner + 2, i);
+                const Quad x = stored_from_first(corner, i), y = stored_from_first(corner + 1, i),
+                           z = stored_from_first(corner + 2, i);
                 for (glm::length_t k = 0; k < 3; ++k) {
-                    const auto entry = [&](glm::length_t column) { return static_cast<float>(rotation[column][k]); };
+                    const auto entry = [&](glm::length_t column) {
+                        return static_cast<float>(rotation[column][k] * tree_scale_);
+                    };
                     const Quad turned = entry(0) * x + entry(1) * y + entry(2) * z;
                     most = max(most, put(corner + static_cast<size_t>(k), i, turned + static_cast<float>(shift[k])));
                 }
@@ -98,6 +102,9 @@ private:
               rows_[row + 2]);
 #endif
     }
+    Quad stored_from_first(size_t row, size_t i) const {
+        return at(row, i) - origin_[row % 3];
+    }
     Quad at(size_t row, size_t i) const {
         return load<Quad>(rows_[row] + i);
     }
@@ -108,6 +115,7 @@ private:
     }
 
     uint32_t count_;
+    float tree_scale_;
     float origin_[3];
     alignas(16) float rows_[9][kFour], scaled_[9][kFour];
 };

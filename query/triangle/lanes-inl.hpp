@@ -16,9 +16,9 @@
 //
 // Rounding. u = 2^-24. Corners are relative to A's first and scaled by a power of two, so that coordinates are at most
 // R = 1. They are wrong by e:
-//   A's, a difference                        u R
+//   A's, a difference, and times a scale     2 u R
 //   B's, from its first corner               u |w|, and |w| <= 2 sqrt(3) R, for both its ends lie in the cube of R
-//        turned                              5 u |w| in all, the rounded matrix and 3 products and 2 sums included
+//        turned, and scaled with the matrix  5 u |w| in all, the rounded matrix and 3 products and 2 sums included
 //        moved, by a rounded shift           2 u R
 //        which was computed in double        80 * 2^-53 S, as in separation.hpp
 //   e <= 20 u R + 80 * 2^-53 S; kPlacementError is 24 u.

@@ -10,7 +10,7 @@ PlacedTriangle place(const TreeView& tree, uint32_t triangle) noexcept {
     PlacedTriangle out{};
     const Triangle corners = tree.triangle(triangle);
     for (size_t i = 0; i < 3; ++i) {
-        out.corner[i] = to_double(tree.vertex(corners[i]));
+        out.corner[i] = position(tree, corners[i]);
         out.reach = std::max(out.reach, glm::length(out.corner[i]));
     }
     return out;

@@ -10,6 +10,11 @@
 
 namespace prolate::query {
 
+/// A vertex as queries see it, metres: exact, whatever the tree's scale.
+inline glm::dvec3 position(const TreeView& tree, uint32_t vertex) {
+    return to_double(tree.vertex(vertex)) * double{tree.scale()};
+}
+
 /// A triangle placed in A's frame.
 struct PlacedTriangle {
     glm::dvec3 corner[3];

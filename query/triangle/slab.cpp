@@ -53,7 +53,7 @@ struct Reaching {
     dvec3 about_center() const { return flat ? point : bound().center; }
 
 private:
-    PlacedEllipsoid bound() const { return place(at.tree.bound(at.node)); }
+    PlacedEllipsoid bound() const { return place(at.tree.bound(at.node), at.tree.scale()); }
 };
 
 double gap_along(const dvec3& n, const Reaching& a, const Reaching& b, const RelativePose& b_to_a) {

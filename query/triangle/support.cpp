@@ -17,7 +17,7 @@ template <class Index> double support_of(const TreeView& tree, const TriangleRan
         const auto at = [x](size_t k) { return double{load_le<float>(x + k * sizeof(float))}; };
         most = std::max(most, (n.x * at(0) + n.y * at(1)) + n.z * at(2));
     }
-    return most;
+    return most * double{tree.scale()};
 }
 
 } // namespace
@@ -27,7 +27,7 @@ double triangle_support(const TreeView& tree, const TriangleRange& range, const 
 }
 
 double triangle_reach(const TreeView& tree) noexcept {
-    return place(tree.root_bound()).reach;
+    return place(tree.root_bound(), tree.scale()).reach;
 }
 
 } // namespace prolate::query

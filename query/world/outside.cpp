@@ -85,7 +85,7 @@ struct LowestIds {
 // A box around all places of a body that turns about its center, as it begins.
 Bounds about_center(const MovingTree& moving, const SweepOptions& options) {
     const query::RelativePose at = query::relative_pose({}, moving.motion.start);
-    const query::PlacedEllipsoid root = query::place(moving.tree.root_bound());
+    const query::PlacedEllipsoid root = query::place(moving.tree.root_bound(), moving.tree.scale());
     const dvec3 pivot = query::to_double(moving.motion.center), center = at.rotation * pivot + at.translation;
     // Within the tolerance two bodies may be said to meet: by default, 1e-4 of the smaller one's size.
     const double tolerance = query::sound_tolerance(options.tolerance) + 1e-4 * root.size;

@@ -1,11 +1,11 @@
 #include "query/world/reach.hpp"
 
-#include "query/ellipsoid/placed.hpp"
+#include "query/triangle/placed.hpp"
 #include "src/block.hpp"
 #include "src/block_box.hpp"
 #include "src/bytes.hpp"
 #include "src/hull.hpp"
-#include "src/power_of_two.hpp"
+#include "src/lattice.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -38,10 +38,12 @@ struct Along {
     dvec3 factor;  // L^T r
     double size;   // what bounds the rounding
 };
-Along along(const Ellipsoid& e, const dvec3& r) {
-    const dvec3 c = to_double(e.center), diagonal{e.l11, e.l22, e.l33}, off_diagonal{e.l21, e.l31, e.l32};
+Along along(const Ellipsoid& e, double scale, const dvec3& r) {
+    const dvec3 c = to_double(e.center) * scale, diagonal = dvec3(e.l11, e.l22, e.l33) * scale,
+                off_diagonal = dvec3(e.l21, e.l31, e.l32) * scale;
     return {glm::dot(r, c),
-            {r.x * e.l11 + r.y * e.l21 + r.z * e.l31, r.y * e.l22 + r.z * e.l32, r.z * e.l33},
+            {r.x * diagonal.x + r.y * off_diagonal.x + r.z * off_diagonal.y, r.y * diagonal.y + r.z * off_diagonal.z,
+             r.z * diagonal.z},
             sum_of_sizes(c) + sum_of_sizes(diagonal) + sum_of_sizes(off_diagonal)};
 }
 
@@ -54,7 +56,7 @@ struct Interval {
 void box_reaches(const TreeView& tree, uint32_t b, const dvec3& r, double rounding, Interval (&out)[kBlockLanes]) {
     const BlockBoxes boxes(tree.raw().bounding_block(b));
     const LatticeInfo lattice = tree.raw().lattice();
-    const double step = power_of_two(lattice.step_exponent);
+    const double step = step_of(lattice);
     double wide[kBlockLanes] = {}, at[kBlockLanes] = {}, size[kBlockLanes] = {};
     for (size_t k = 0; k < 3; ++k) {
         const double along = r[static_cast<glm::length_t>(k)], across = std::abs(along);
@@ -77,7 +79,7 @@ Interval hull_reach(const TreeView& tree, uint32_t node, const ChildRange& child
     const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
     const double share = load_le<uint8_t>(record + kHullShare) / kHullShares;
     if (share == 0) return {-kInfinite, kInfinite};
-    const Along e = along(tree.ellipsoid(node), r);
+    const Along e = along(tree.ellipsoid(node), tree.scale(), r);
     const auto w = [record](size_t k, size_t i) {
         return static_cast<double>(load_le<int8_t>(record + kHullPoint + kHullPoints * k + i));
     };
@@ -162,13 +164,13 @@ private:
 
     void settle(uint32_t leaf) {
         if (!tree_.has_triangles()) {
-            const Along e = along(tree_.ellipsoid(leaf), r_);
+            const Along e = along(tree_.ellipsoid(leaf), tree_.scale(), r_);
             return settle(e.center + glm::length(e.factor), e.size);
         }
         const TriangleRange range = tree_.triangles(leaf);
         for (uint32_t t = range.first; t < range.first + range.count; ++t)
             for (const uint32_t corner : tree_.triangle(t)) {
-                const dvec3 p = to_double(tree_.vertex(corner));
+                const dvec3 p = position(tree_, corner);
                 settle(glm::dot(r_, p), sum_of_sizes(p));
             }
     }

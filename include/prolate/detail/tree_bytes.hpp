@@ -17,6 +17,7 @@ inline constexpr size_t kHullBytes = 64;   ///< bytes of one hull record in the 
 struct LatticeInfo {
     int32_t origin[3] = {};    ///< |origin_i + q_i| < 2^24, and a float holds the sum exactly
     int32_t step_exponent = 0; ///< -112 ... 60
+    float scale = 1;           ///< TreeView::scale(): queries see all lengths so many times as large
 };
 
 namespace detail {
