@@ -43,8 +43,8 @@ static_assert(sizeof(PairCache) == 80);
 /// shared trees. The search is described in query/collide/search.cpp, the test of two ellipsoids (J. W. Perram, M. S.
 /// Wertheim, "Statistical mechanics of hard ellipsoids", Journal of Computational Physics 58, 1985) in
 /// query/ellipsoid/separation.hpp.
-CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                      QueryContext& context, const QueryOptions& options = {}, PairCache* cache = nullptr) noexcept;
+CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                      const QueryOptions& options = {}, PairCache* cache = nullptr) noexcept;
 
 /// Answer of collide_all().
 struct CollideAllResult {
@@ -58,7 +58,6 @@ struct CollideAllResult {
 /// in a fixed order. The first pairs.size() of them are written. If the budget runs out, the verdict is overlapping if
 /// a pair was found before, else undecided, and `found` counts those found so far. Thread-safe on shared trees.
 CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                             std::span<MeetingPair> pairs, QueryContext& context,
-                             const QueryOptions& options = {}) noexcept;
+                             std::span<MeetingPair> pairs, Scratch context, const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

@@ -90,6 +90,6 @@ struct ContactResult {
 /// options.max_pair_tests, count one run. query/contacts/contacts.cpp has the details, query/triangle/contact.hpp the
 /// normals.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options = {}) noexcept;
+                       ContactManifolds& manifolds, Scratch context, const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

@@ -71,8 +71,7 @@ struct DistanceResult {
 ///
 /// Branch and bound over pairs of nodes (D. E. Johnson, E. Cohen, "A Framework for Efficient Minimum Distance
 /// Computations", IEEE International Conference on Robotics and Automation, 1998); query/distance/search.cpp.
-DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                        QueryContext& context, const DistanceOptions& options = {},
-                        DistanceCache* cache = nullptr) noexcept;
+DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                        const DistanceOptions& options = {}, DistanceCache* cache = nullptr) noexcept;
 
 } // namespace prolate

@@ -17,7 +17,7 @@ namespace prolate {
 /// below point_a, and the normal against that of the half-space. The verdict is that of overlap(). Of `pair`, node_b
 /// and triangle_b mean nothing. With a half-space that is not finite, or whose normal is 0, nothing is certain:
 /// undecided, 0 <= distance <= infinity. max_level of the options is not used. Thread-safe on shared trees.
-DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
+DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
                         const DistanceOptions& options = {}) noexcept;
 
 /// Contacts of the body with the half-space: one manifold, whose normal is against that of the half-space (moving the
@@ -28,7 +28,7 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
 /// at full depth; if it is overlapping, there is a point. ContactResult::found counts the corners that were looked at
 /// and touch. Thread-safe on shared trees.
 ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
-                       QueryContext& context, const QueryOptions& options = {}) noexcept;
+                       Scratch context, const QueryOptions& options = {}) noexcept;
 
 /// When does the moving body first meet the half-space, which is at rest? As sweep() of two bodies, with the same
 /// certificates and tolerance (the body is the smaller one); point_b on the plane below point_a. With a half-space that
@@ -36,7 +36,7 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
 ///
 /// Conservative advancement of the whole body: its lowest point and a bound on the speed of any point towards the
 /// plane.
-SweepResult sweep(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, QueryContext& context,
+SweepResult sweep(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, Scratch context,
                   const SweepOptions& options = {}) noexcept;
 
 } // namespace prolate

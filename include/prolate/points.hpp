@@ -48,18 +48,18 @@ struct SignedDistance {
 ///
 /// Anytime: a small budget only widens the bounds. A pose or point that is not finite, or a quaternion of zero, leaves
 /// everything open. Thread-safe on shared trees. The search is described in query/points/search.cpp.
-SignedDistance signed_distance(const TreeView& tree, const Pose& pose, const Vec3& point, QueryContext& context,
+SignedDistance signed_distance(const TreeView& tree, const Pose& pose, const Vec3& point, Scratch context,
                                const PointOptions& options = {}) noexcept;
 
 /// The same for many points: out[i] is the answer for points[i], for as many as both spans have. All but the counters
 /// are those of the single query, to the bit. Points that follow each other closely are answered sooner: each search
 /// begins with the last one's triangle, and a point within the last one's distance needs no ray to tell its side.
 void signed_distance(const TreeView& tree, const Pose& pose, std::span<const Vec3> points,
-                     std::span<SignedDistance> out, QueryContext& context, const PointOptions& options = {}) noexcept;
+                     std::span<SignedDistance> out, Scratch context, const PointOptions& options = {}) noexcept;
 
 /// Only the side: the verdict of signed_distance() for each point, sooner.
-Verdict contains(const TreeView& tree, const Pose& pose, const Vec3& point, QueryContext& context) noexcept;
+Verdict contains(const TreeView& tree, const Pose& pose, const Vec3& point, Scratch context) noexcept;
 void contains(const TreeView& tree, const Pose& pose, std::span<const Vec3> points, std::span<Verdict> out,
-              QueryContext& context) noexcept;
+              Scratch context) noexcept;
 
 } // namespace prolate

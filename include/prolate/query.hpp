@@ -42,6 +42,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace prolate {
 
@@ -72,8 +73,9 @@ struct QueryStats {
 
 inline constexpr uint32_t kNoTriangle = UINT32_MAX;
 
-/// Scratch of a query, owned by the caller: 80 KiB, so rather on the heap than on a thread's stack. Reusable for any
-/// number of queries of any kind, by one query at a time. Needs no initialisation.
+/// Scratch of a query, owned by the caller: 80 KiB, which is enough for every query of any trees, so rather on the heap
+/// than on a thread's stack. Reusable for any number of queries of any kind, by one query at a time. Needs no
+/// initialisation.
 struct QueryContext {
     /// A pair of nodes still to be looked at. What the last two mean is up to the query.
     struct Entry {
@@ -85,5 +87,34 @@ struct QueryContext {
     alignas(64) Entry entries[kEntries];
 };
 static_assert(sizeof(QueryContext) == size_t{80} * 1024);
+
+/// The memory that a query works in: a QueryContext, or as much as the caller has, such as a few KiB of a fibre's
+/// stack. A view, passed by value: a QueryContext converts to it. One query at a time may work in it.
+///
+/// With less than scratch_size() a query makes no test, and answers `undecided` (bounds that claim nothing, no points).
+/// With that and less than a QueryContext the same is certified; distance() and sweep() then search depth first where
+/// they would have gone best first, so they may make more tests, and give other bounds within the tolerance.
+///
+/// Besides, queries take up to 40 KiB of stack (contacts(); the others up to 24 KiB).
+class Scratch {
+public:
+    using Entry = QueryContext::Entry;
+
+    Scratch(QueryContext& context) noexcept : entries_(context.entries), count_(QueryContext::kEntries) {}
+    /// Memory of any alignment, of which up to 15 bytes are not used.
+    explicit Scratch(std::span<std::byte> memory) noexcept;
+
+    Entry* entries() const noexcept { return entries_; }
+    uint32_t count() const noexcept { return count_; } ///< of entries, at most QueryContext::kEntries
+
+private:
+    Entry* entries_;
+    uint32_t count_;
+};
+
+/// Bytes of memory that a Scratch needs at least, for all queries of these trees: of trees as build() makes them, of
+/// degree 8, about 2 to 6 KiB. Never more than sizeof(QueryContext).
+size_t scratch_size(const TreeView& tree) noexcept;
+size_t scratch_size(const TreeView& a, const TreeView& b) noexcept;
 
 } // namespace prolate

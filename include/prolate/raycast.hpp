@@ -52,12 +52,12 @@ struct RaycastResult {
 /// t = 0; with an infinite or NaN margin, every ray does. Nodes at options.max_level count as the ellipsoids that hold
 /// all that lies below them. Nodes are visited nearest first, and not at all beyond the best hit. Thread-safe on shared
 /// trees. The search is described in query/raycast/search.cpp, the tests in query/raycast/ray.hpp.
-RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
+RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                       const QueryOptions& options = {}) noexcept;
 
 /// The same, but stops at any hit, which need not be the first: for shadows and lines of sight. The verdict is that of
 /// raycast().
-RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
+RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                           const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

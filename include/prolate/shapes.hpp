@@ -49,13 +49,13 @@ struct OverlapResult {
 /// Do the body at `pose` and the shape meet, or come within options.margin of each other? Stops at the first leaf, or
 /// triangle, that does. Thread-safe on shared trees. The search is described in query/shapes/search.cpp, the tests in
 /// query/shapes/rounded_box.hpp.
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, Scratch context,
                       const QueryOptions& options = {}) noexcept;
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, Scratch context,
                       const QueryOptions& options = {}) noexcept;
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const Box& box, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const Box& box, Scratch context,
                       const QueryOptions& options = {}) noexcept;
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
                       const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

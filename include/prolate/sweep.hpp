@@ -87,7 +87,7 @@ struct SweepResult {
 /// Berkeley, 1996; X. Zhang, S. Redon, M. Lee, Y. J. Kim, "Continuous Collision Detection for Articulated Models Using
 /// Taylor Models and Temporal Culling", ACM Transactions on Graphics 26(3), 2007) of pairs of nodes, each at its own
 /// pace, the earliest first; query/sweep/search.cpp.
-SweepResult sweep(const TreeView& a, const Motion& motion_a, const TreeView& b, const Motion& motion_b,
-                  QueryContext& context, const SweepOptions& options = {}) noexcept;
+SweepResult sweep(const TreeView& a, const Motion& motion_a, const TreeView& b, const Motion& motion_b, Scratch context,
+                  const SweepOptions& options = {}) noexcept;
 
 } // namespace prolate

@@ -15,10 +15,10 @@ void node_growth(const TreeView& tree, std::span<float> growth) noexcept;
 /// The first hit of the ray with the ellipsoids of the cut at options.max_level, just as they are stored, of exact
 /// trees too. `growth` comes from node_growth(). Everything else is as in raycast(). Thread-safe on shared trees.
 RaycastResult raycast_cut(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
-                          QueryContext& context, const QueryOptions& options = {}) noexcept;
+                          Scratch context, const QueryOptions& options = {}) noexcept;
 
 /// The same, but stops at any hit, as raycast_any() does.
 RaycastResult raycast_cut_any(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
-                              QueryContext& context, const QueryOptions& options = {}) noexcept;
+                              Scratch context, const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

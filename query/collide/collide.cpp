@@ -3,6 +3,7 @@
 // little.
 #include "query/collide/search.hpp"
 #include "query/inside/enclosure.hpp"
+#include "query/node/scratch.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -79,8 +80,8 @@ Verdict query::decide(CollideSearch& search) noexcept {
 }
 
 CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                             std::span<MeetingPair> pairs, QueryContext& context,
-                             const QueryOptions& options) noexcept {
+                             std::span<MeetingPair> pairs, Scratch context, const QueryOptions& options) noexcept {
+    if (!query::suffices(context, a, b)) return {};
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
     query::CollideSearch search(bodies, context, options);
     search.all = true;
@@ -95,8 +96,9 @@ CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeVi
             .stats = search.stats};
 }
 
-CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                      QueryContext& context, const QueryOptions& query_options, PairCache* cache) noexcept {
+CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                      const QueryOptions& query_options, PairCache* cache) noexcept {
+    if (!query::suffices(context, a, b)) return {};
     const QueryOptions options = query::sound(query_options);
     if (!usable(cache, a, b, options)) cache = nullptr;
     const auto remember = [&](Verdict verdict, const MeetingPair& pair, double distance) {

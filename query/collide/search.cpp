@@ -36,7 +36,7 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
-// QueryContext::Entry::flags: which of the two nodes is to be opened, whether the other is a leaf, and whether slabs
+// Scratch::Entry::flags: which of the two nodes is to be opened, whether the other is a leaf, and whether slabs
 // have said what they can.
 constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2, kInOnePlane = 4;
 
@@ -222,7 +222,7 @@ private:
             }
             lanes &= ~(1u << lane);
             if (kSifts) {
-                QueryContext::Entry e{open != 0 ? other : first + lane, open != 0 ? first + lane : other, 0, flags};
+                Scratch::Entry e{open != 0 ? other : first + lane, open != 0 ? first + lane : other, 0, flags};
                 if (s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
             }
             const bool look = kept.depth[lane] > kLeavesNearlySeparated;
@@ -251,7 +251,7 @@ private:
     // together.
     static_assert(QueryContext::kEntries > 2 * (kMaxLevels - 1) * (kMaxDegree - 1) + 1);
     CollideSearch& s_;
-    QueryContext::Entry* const stack_;
+    Scratch::Entry* const stack_;
     uint32_t size_ = 0;
     uint64_t pair_tests_ = 0, block_tests_ = 0;
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();

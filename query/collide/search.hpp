@@ -23,7 +23,7 @@ struct CollideSearch {
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
     const QueryOptions options; // sound
-    QueryContext::Entry* const stack;
+    Scratch::Entry* const stack;
     QueryStats stats;
 
     bool all = false; ///< go on after the first pair
@@ -35,7 +35,7 @@ struct CollideSearch {
     /// so that the last are opened first, and takes out those that need not be opened. Returns the new end. Each pair
     /// comes again before it is opened, or decided, alone. It may set kSiftBits of an entry's flags: pairs below it
     /// keep them.
-    QueryContext::Entry* (*sift)(void* user, QueryContext::Entry* begin, QueryContext::Entry* end) = nullptr;
+    Scratch::Entry* (*sift)(void* user, Scratch::Entry* begin, Scratch::Entry* end) = nullptr;
     void* sift_user = nullptr;
     static constexpr uint32_t kSiftBits = 0xff00;
     uint64_t other_tests = 0;  ///< that `each` did, of the same budget
@@ -47,9 +47,9 @@ struct CollideSearch {
     float skin = 0;
     bool roots_meet = false;
 
-    CollideSearch(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a,
-                  QueryContext& context, const QueryOptions& query_options) noexcept;
-    CollideSearch(const OrderedBodies<Pose>& bodies, QueryContext& context, const QueryOptions& query_options) noexcept
+    CollideSearch(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a, Scratch context,
+                  const QueryOptions& query_options) noexcept;
+    CollideSearch(const OrderedBodies<Pose>& bodies, Scratch context, const QueryOptions& query_options) noexcept
         : CollideSearch(bodies.a, bodies.b, relative_pose(bodies.place_a, bodies.place_b), context, query_options) {}
 
     /// Decides on two leaves: takes all their pairs that meet, or the first. True to stop the query. `normal` is 0, or

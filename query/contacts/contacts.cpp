@@ -19,6 +19,7 @@
 #include "query/contacts/manifold.hpp"
 #include "query/contacts/node_pair.hpp"
 #include "query/contacts/pair_contacts.hpp"
+#include "query/node/scratch.hpp"
 
 #include <prolate/contacts.hpp>
 
@@ -49,21 +50,22 @@ double smaller_size(const CollideSearch& search) {
 
 class Collector {
 public:
-    Collector(CollideSearch& search, QueryContext& context, bool exchanged, const LastContacts& last, uint64_t many)
+    Collector(CollideSearch& search, Scratch context, bool exchanged, const LastContacts& last, uint64_t many)
         : search_(search), exchanged_(exchanged), many_(many), last_(last), size_(smaller_size(search)),
           pairs_(search, context, kSamePoint * size_), patches_(kSamePoint * size_) {
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
         search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
         search.each_user = this;
         if (search.a.limit_from != UINT32_MAX || search.b.limit_from != UINT32_MAX) return; // nodes stand for triangles
-        search.sift = [](void* self, QueryContext::Entry* begin, QueryContext::Entry* end) {
+        search.sift = [](void* self, Scratch::Entry* begin, Scratch::Entry* end) {
             return static_cast<Collector*>(self)->sift(begin, end);
         };
         search.sift_user = this;
     }
 
-    // Between the two passes: settles the normals and depths of the manifolds.
-    void settle() {
+    // Between the two passes: settles the normals and depths of the manifolds. Not inlined, so that its groups are not
+    // on the stack during the passes.
+    [[gnu::noinline]] void settle() {
         flush();
         reduce_ = search_.found >= many_ && !gives_up();
         looked_at_ = resolved_ = 0;
@@ -110,12 +112,12 @@ private:
     // ---- what need not be looked at ----
 
     // CollideSearch::sift.
-    QueryContext::Entry* sift(QueryContext::Entry* begin, QueryContext::Entry* end) {
+    Scratch::Entry* sift(Scratch::Entry* begin, Scratch::Entry* end) {
         if (!(settled_ ? reduce_ : search_.found >= many_ && !patches_.full()) || gives_up()) return end;
         double gains[kBlockLanes];
         uint32_t count = 0;
-        for (const QueryContext::Entry* from = begin; from < end; ++from) {
-            QueryContext::Entry e = *from;
+        for (const Scratch::Entry* from = begin; from < end; ++from) {
+            Scratch::Entry e = *from;
             const double gain = gain_of(e);
             if (!(gain > 0)) continue;
             uint32_t at = count++;
@@ -128,7 +130,7 @@ private:
     bool gives_up() const { return looked_at_ >= kTries && resolved_ * kFewResolved < looked_at_; }
     // How much farther out, or deeper, points of a pair of nodes may lie than those that are known of the patch or way
     // that resolves it. Infinite if there is none, or the pair is not flat; not above 0: it need not be looked at.
-    double gain_of(QueryContext::Entry& e) {
+    double gain_of(Scratch::Entry& e) {
         const NodePair pair(search_, e.node_a, e.node_b);
         uint32_t resolving = e.flags / kFirstSiftBit; // 0: not known yet, else one more than its number
         if (resolving == 0) resolving = resolving_patch(pair);
@@ -283,8 +285,12 @@ private:
 } // namespace
 
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options,
+                       ContactManifolds& manifolds, Scratch context, const QueryOptions& options,
                        uint64_t many) noexcept {
+    if (!suffices(context, a, b)) {
+        manifolds = {};
+        return {};
+    }
     const auto bodies = in_canonical_order(a, pose_a, b, pose_b);
     CollideSearch search(bodies, context, options);
     const RelativePose to_world = relative_pose(Pose{}, bodies.place_a);
@@ -318,7 +324,7 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
 } // namespace query
 
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options) noexcept {
+                       ContactManifolds& manifolds, Scratch context, const QueryOptions& options) noexcept {
     return query::contacts(a, pose_a, b, pose_b, manifolds, context, options, query::kMany);
 }
 

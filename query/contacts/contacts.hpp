@@ -12,7 +12,7 @@ inline constexpr uint64_t kMany = 64;
 
 /// The public contacts(), which leaves out nothing before `many` pairs meet.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                       ContactManifolds& manifolds, QueryContext& context, const QueryOptions& options,
+                       ContactManifolds& manifolds, Scratch context, const QueryOptions& options,
                        uint64_t many) noexcept;
 
 } // namespace prolate::query

@@ -50,7 +50,7 @@ class PairContacts {
 public:
     /// Points nearer to each other than `same_point`, metres, are one. Both arguments must outlive it; between two
     /// traversals it uses the context's scratch.
-    PairContacts(CollideSearch& search, QueryContext& context, double same_point) noexcept;
+    PairContacts(CollideSearch& search, Scratch context, double same_point) noexcept;
 
     /// The contacts along the normal that the pair has by itself; none, if it is not about as short a way out as the
     /// known one.
@@ -87,7 +87,7 @@ private:
                       DeepestContacts& out);
 
     CollideSearch& s_;
-    QueryContext& context_;
+    Scratch context_;
     const double same_point_;
     bool closed_a_, closed_b_;
     const Hills hills_a_, hills_b_;

@@ -36,8 +36,9 @@ DistanceResult run(query::DistanceSearch& search, const Pose& pose_a, const Meet
 
 } // namespace
 
-DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                        QueryContext& context, const DistanceOptions& options, DistanceCache* cache) noexcept {
+DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                        const DistanceOptions& options, DistanceCache* cache) noexcept {
+    if (!query::suffices(context, a, b)) return {};
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
     MeetingPair first;
     const bool has_first = cache != nullptr && cache->valid;

@@ -29,12 +29,13 @@ DistanceOptions sound(DistanceOptions options) {
 
 } // namespace
 
-DistanceSearch::DistanceSearch(const OrderedBodies<Pose>& bodies, QueryContext& context,
+DistanceSearch::DistanceSearch(const OrderedBodies<Pose>& bodies, Scratch context,
                                const DistanceOptions& distance_options) noexcept
     : a(tree_side(bodies.a, distance_options.max_level)), b(tree_side(bodies.b, distance_options.max_level)),
       b_to_a(relative_pose(bodies.place_a, bodies.place_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
       lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(distance_options)),
-      entries(context.entries), triangle_reach_(triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance) {}
+      entries(context.entries()), room(heap_room(context, a.tree, b.tree)),
+      triangle_reach_(triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
     const PlacedEllipsoid x = place(search.a.tree.bound(0), search.a.tree.scale()),

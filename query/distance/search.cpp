@@ -61,7 +61,7 @@ struct DistanceSide : Side<PlacedNodeWithBox> {
 
 // The least bound first; of equal ones, which flat faces have by the thousand, what lies opposite each other.
 struct ByBoundAndCenters {
-    using Entry = QueryContext::Entry;
+    using Entry = Scratch::Entry;
     static constexpr uint32_t kFlags = kOpenB | kLeaves;
     static bool before(const Entry& x, const Entry& y) {
         return x.bound < y.bound || (x.bound == y.bound && (x.flags & ~kFlags) < (y.flags & ~kFlags));
@@ -70,15 +70,15 @@ struct ByBoundAndCenters {
     static uint32_t flags(float between) { return std::bit_cast<uint32_t>(between) & ~kFlags; }
 };
 
-// QueryContext::Entry::bound is the pair's, less that of the roots. kFlat: the roots end with faces that are parallel.
+// Scratch::Entry::bound is the pair's, less that of the roots. kFlat: the roots end with faces that are parallel.
 template <bool kFlat> class DistanceTraversal {
-    using Entry = QueryContext::Entry;
+    using Entry = Scratch::Entry;
 
 public:
     DistanceTraversal(DistanceSearch& search, double by_slabs) // a bound on the distance of the roots
         : s_(search),
           heap_(search.entries), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}},
-          by_slabs_(by_slabs), room_(heap_room(search.a.tree, search.b.tree)) {}
+          by_slabs_(by_slabs), room_(search.room) {}
 
     void run() {
         search();

@@ -5,6 +5,7 @@
 #include "query/node/lattice.hpp"
 #include "query/node/limits.hpp"
 #include "query/node/order.hpp"
+#include "query/node/scratch.hpp"
 #include "query/node/tree_side.hpp"
 #include "query/triangle/distance.hpp"
 #include "query/triangle/slab.hpp"
@@ -25,7 +26,8 @@ struct DistanceSearch {
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
     const DistanceOptions options; // sound
-    QueryContext::Entry* const entries;
+    Scratch::Entry* const entries;
+    const uint32_t room; ///< for entries that wait in the heap
     QueryStats stats;
 
     bool complete = false;    ///< no budget ran out
@@ -43,7 +45,7 @@ struct DistanceSearch {
     glm::dvec3 normal{0, 0, 0};   ///< unit, from on_a to on_b; 0 if they coincide or are not known
     glm::dvec3 normal_b{0, 0, 0}; ///< the same as B's frame has it
 
-    DistanceSearch(const OrderedBodies<Pose>& bodies, QueryContext& context,
+    DistanceSearch(const OrderedBodies<Pose>& bodies, Scratch context,
                    const DistanceOptions& distance_options) noexcept;
 
     /// Pairs whose bound is at least this, > 0, need not be looked at: they cannot improve the answer by more than the

@@ -12,6 +12,7 @@
 #include "query/contacts/pair_contacts.hpp"
 #include "query/half_space/lowest.hpp"
 #include "query/half_space/search.hpp"
+#include "query/node/scratch.hpp"
 #include "query/triangle/placed.hpp"
 
 #include <glm/geometric.hpp>
@@ -113,9 +114,10 @@ private:
 } // namespace
 } // namespace query
 
-DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
+DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
                         const DistanceOptions& options) noexcept {
     DistanceResult out;
+    if (!query::suffices(context, tree)) return out;
     const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
     if (!query::is_finite(shape)) return out;
     query::HeightSearch search(tree, shape, context, {.max_pair_tests = options.max_pair_tests});
@@ -144,13 +146,14 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
 }
 
 ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
-                       QueryContext& context, const QueryOptions& query_options) noexcept {
+                       Scratch context, const QueryOptions& query_options) noexcept {
     const QueryOptions options = query::sound(query_options);
     const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
     const query::RelativePose to_world = query::relative_pose(Pose{}, pose);
     const query::LastContacts last(manifolds, false, to_world);
     manifolds = {};
     ContactResult out;
+    if (!query::suffices(context, tree)) return out;
     if (!query::is_finite(shape) || !std::isfinite(options.margin)) {
         out.verdict = Verdict::overlapping; // as overlap() has it; there is no place for points
         return out;

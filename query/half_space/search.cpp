@@ -26,7 +26,7 @@ namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
 class HeightTraversal {
-    using Entry = QueryContext::Entry;
+    using Entry = Scratch::Entry;
 
 public:
     explicit HeightTraversal(HeightSearch& search)

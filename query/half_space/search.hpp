@@ -19,7 +19,7 @@ struct HeightSearch {
     const PlacedHalfSpace shape;
     const LaneHalfSpace lanes;
     const uint64_t max_tests;
-    QueryContext::Entry* const stack;
+    Scratch::Entry* const stack;
     QueryStats stats;
 
     double limit = std::numeric_limits<double>::infinity(); ///< nodes that are higher need not be looked at, metres
@@ -31,11 +31,11 @@ struct HeightSearch {
     bool (*wanted)(void* user, uint32_t slot, double bound) = nullptr;
     void* user = nullptr;
 
-    HeightSearch(const TreeView& tree, const PlacedHalfSpace& half_space, QueryContext& context,
+    HeightSearch(const TreeView& tree, const PlacedHalfSpace& half_space, Scratch context,
                  const QueryOptions& options) noexcept
         : side(tree_side(tree, options.max_level)), shape(half_space),
           lanes(lane_half_space(half_space, tree.raw().lattice())), max_tests(options.max_pair_tests),
-          stack(context.entries) {}
+          stack(context.entries()) {}
     uint64_t left() const noexcept { return tests_left(max_tests, stats.tests()); }
 };
 

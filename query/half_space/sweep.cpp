@@ -15,6 +15,7 @@
 #include <prolate/half_space.hpp>
 
 #include "query/half_space/lowest.hpp"
+#include "query/node/scratch.hpp"
 #include "query/sweep/motion.hpp"
 
 #include <glm/geometric.hpp>
@@ -45,7 +46,7 @@ Motion at_rest(const Vec3& translation) {
 
 class Fall {
 public:
-    Fall(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, QueryContext& context,
+    Fall(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, Scratch context,
          const SweepOptions& options)
         : tree_(tree), context_(context), options_(sound(options)), start_(to_double(motion.start.translation)),
           motion_(motion, at_rest(motion.start.translation)),
@@ -121,7 +122,7 @@ private:
     }
 
     const TreeView& tree_;
-    QueryContext& context_;
+    Scratch context_;
     const SweepOptions options_;
     const dvec3 start_; // the body's translation
     const PairMotion motion_;
@@ -137,8 +138,9 @@ private:
 } // namespace
 } // namespace query
 
-SweepResult sweep(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, QueryContext& context,
+SweepResult sweep(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, Scratch context,
                   const SweepOptions& options) noexcept {
+    if (!query::suffices(context, tree)) return {};
     return query::Fall(tree, motion, half_space, context, options).run();
 }
 

@@ -1,5 +1,4 @@
-// What best-first traversals of two trees share: how an entry says which of its two nodes is to be opened, and how many
-// entries may wait in the heap.
+// What best-first traversals of two trees share: how an entry says which of its two nodes is to be opened.
 #pragma once
 
 #include "query/node/tree_side.hpp"
@@ -18,19 +17,13 @@ inline bool are_leaves(uint32_t flags) {
     return (flags & kLeaves) == kLeaves;
 }
 /// Is the node to be opened too deep for QueryOptions::max_level?
-inline bool too_deep(const QueryContext::Entry& e, const TreeSide& a, const TreeSide& b) {
+inline bool too_deep(const Scratch::Entry& e, const TreeSide& a, const TreeSide& b) {
     return (e.flags & kOpenB) != 0 ? e.node_b >= b.limit_from : e.node_a >= a.limit_from;
 }
 /// Of the pair of the roots: the larger one is opened, unless it is a leaf.
 inline uint32_t root_flags(const TreeView& a, const TreeView& b, bool b_is_larger) {
     const bool leaf_a = a.is_leaf(0), leaf_b = b.is_leaf(0);
     return (!leaf_b && (leaf_a || b_is_larger) ? kOpenB : 0) | (leaf_a ? kLeafA : 0) | (leaf_b ? kLeafB : 0);
-}
-
-/// Entries of a context that a heap may hold, so that those above it suffice to search any pair depth first.
-inline uint32_t heap_room(const TreeView& a, const TreeView& b) {
-    const auto most_siblings = [](const TreeView& tree) { return uint64_t{tree.degree()} * (tree.level_count() - 1); };
-    return static_cast<uint32_t>(QueryContext::kEntries - kMaxDegree - most_siblings(a) - most_siblings(b));
 }
 
 } // namespace prolate::query

@@ -10,12 +10,12 @@
 namespace prolate::query {
 
 struct ByBound {
-    static bool before(const QueryContext::Entry& x, const QueryContext::Entry& y) { return x.bound < y.bound; }
+    static bool before(const Scratch::Entry& x, const Scratch::Entry& y) { return x.bound < y.bound; }
 };
 
 template <class Order = ByBound> class PairHeap {
 public:
-    using Entry = QueryContext::Entry;
+    using Entry = Scratch::Entry;
 
     explicit PairHeap(Entry* entries) : entries_(entries) {}
     bool empty() const { return size_ == 0; }

@@ -104,10 +104,9 @@ dvec3 in_ball(const dmat3& l, const dvec3& x) {
 
 } // namespace
 
-PointSearch::PointSearch(const TreeView& tree, const PlacedPoint& placed, QueryContext& context,
-                         uint64_t most_tests) noexcept
+PointSearch::PointSearch(const TreeView& tree, const PlacedPoint& placed, Scratch context, uint64_t most_tests) noexcept
     : side(tree_side(tree, kMaxLevels)), point(placed), probe(probe_of(placed, tree.raw().lattice())),
-      max_tests(most_tests), stack(context.entries) {}
+      max_tests(most_tests), stack(context.entries()) {}
 
 double PointSearch::metres(float square) const noexcept {
     return std::sqrt(double{square}) * step_of(side.lattice) * (1 - 0x1p-50);

@@ -2,6 +2,7 @@
 // ray tells on which side of a closed surface the point is (query/inside), or the ellipsoids that hold it how deep.
 #include "query/ellipsoid/separation.hpp"
 #include "query/inside/inside.hpp"
+#include "query/node/scratch.hpp"
 #include "query/points/search.hpp"
 
 #include <glm/geometric.hpp>
@@ -26,16 +27,16 @@ struct Answer {
 // Many points against one tree, in its frame.
 class PointBatch {
 public:
-    PointBatch(const TreeView& tree, const Pose& pose, QueryContext& context, const PointOptions& options)
+    PointBatch(const TreeView& tree, const Pose& pose, Scratch context, const PointOptions& options)
         : tree_(tree), to_tree_(relative_pose(pose, Pose{})), to_world_(relative_pose(Pose{}, pose)), context_(context),
           max_tests_(options.max_pair_tests), max_distance_(sound_length(options.max_distance)),
           ellipsoids_(!tree.has_triangles() && !tree.bake_info().exact), surface_mode_(tree.surface_mode()),
-          reach_(place(tree.bound(0), tree.scale()).reach) {}
+          has_room_(suffices(context, tree)), reach_(place(tree.bound(0), tree.scale()).reach) {}
 
     SignedDistance signed_distance(const Vec3& p) {
         const PlacedPoint point = place(p, to_tree_);
         SignedDistance out;
-        if (!std::isfinite(point.reach)) return out;
+        if (!std::isfinite(point.reach) || !has_room_) return out;
         const NearestSearch found = nearest(point, max_distance_, out);
         Answer answer = answer_for(point, found, out.stats);
         if (ellipsoids_ && !(answer.lower > 0)) answer = depth(point, answer, out);
@@ -47,7 +48,7 @@ public:
     // Only whether the point is outside: what is not nearer than rounding need not be looked at.
     Verdict contains(const Vec3& p) {
         const PlacedPoint point = place(p, to_tree_);
-        if (!std::isfinite(point.reach)) return Verdict::undecided;
+        if (!std::isfinite(point.reach) || !has_room_) return Verdict::undecided;
         SignedDistance out;
         const double rounding = 4 * kSeparationMargin * (point.reach + reach_);
         const NearestSearch found = nearest(point, rounding, out);
@@ -159,10 +160,10 @@ private:
 
     const TreeView& tree_;
     const RelativePose to_tree_, to_world_;
-    QueryContext& context_;
+    Scratch context_;
     const uint64_t max_tests_;
     const double max_distance_;
-    const bool ellipsoids_, surface_mode_;
+    const bool ellipsoids_, surface_mode_, has_room_;
     const double reach_; // of the body
     Known known_;
 };
@@ -172,23 +173,23 @@ private:
 
 namespace prolate {
 
-SignedDistance signed_distance(const TreeView& tree, const Pose& pose, const Vec3& point, QueryContext& context,
+SignedDistance signed_distance(const TreeView& tree, const Pose& pose, const Vec3& point, Scratch context,
                                const PointOptions& options) noexcept {
     return query::PointBatch(tree, pose, context, options).signed_distance(point);
 }
 
 void signed_distance(const TreeView& tree, const Pose& pose, std::span<const Vec3> points,
-                     std::span<SignedDistance> out, QueryContext& context, const PointOptions& options) noexcept {
+                     std::span<SignedDistance> out, Scratch context, const PointOptions& options) noexcept {
     query::PointBatch batch(tree, pose, context, options);
     for (size_t i = 0; i < std::min(points.size(), out.size()); ++i) out[i] = batch.signed_distance(points[i]);
 }
 
-Verdict contains(const TreeView& tree, const Pose& pose, const Vec3& point, QueryContext& context) noexcept {
+Verdict contains(const TreeView& tree, const Pose& pose, const Vec3& point, Scratch context) noexcept {
     return query::PointBatch(tree, pose, context, {}).contains(point);
 }
 
 void contains(const TreeView& tree, const Pose& pose, std::span<const Vec3> points, std::span<Verdict> out,
-              QueryContext& context) noexcept {
+              Scratch context) noexcept {
     query::PointBatch batch(tree, pose, context, {});
     for (size_t i = 0; i < std::min(points.size(), out.size()); ++i) out[i] = batch.contains(points[i]);
 }

@@ -53,7 +53,7 @@ HWY_INLINE void box_squares(const std::byte* block, const LatticeProbe& probe, f
 }
 
 template <class Search> class PointTraversal {
-    using Entry = QueryContext::Entry;
+    using Entry = Scratch::Entry;
 
 public:
     explicit PointTraversal(Search& search) : s_(search), stack_(search.stack) {}

@@ -27,13 +27,13 @@ struct PointSearch {
     const PlacedPoint point;
     const LatticeProbe probe;
     const uint64_t max_tests;
-    QueryContext::Entry* const stack;
+    Scratch::Entry* const stack;
     QueryStats stats;
     float limit = std::numeric_limits<float>::infinity(); ///< nodes whose square is above it need not be looked at
     float open = std::numeric_limits<float>::infinity();  ///< least square of those left when the budget ran out
     bool in_root_box = false;                             ///< no: the point is outside of all
 
-    PointSearch(const TreeView& tree, const PlacedPoint& placed, QueryContext& context, uint64_t most_tests) noexcept;
+    PointSearch(const TreeView& tree, const PlacedPoint& placed, Scratch context, uint64_t most_tests) noexcept;
     uint64_t left() const noexcept { return tests_left(max_tests, stats.tests()); }
     /// A lower bound of the distance whose square is at least `square`, metres.
     double metres(float square) const noexcept;
@@ -43,7 +43,7 @@ struct PointSearch {
 
 /// Looks for the nearest leaf.
 struct NearestSearch : PointSearch {
-    NearestSearch(const TreeView& tree, const PlacedPoint& placed, QueryContext& context, uint64_t most_tests,
+    NearestSearch(const TreeView& tree, const PlacedPoint& placed, Scratch context, uint64_t most_tests,
                   bool of_ellipsoids) noexcept
         : PointSearch(tree, placed, context, most_tests), ellipsoids(of_ellipsoids) {}
 

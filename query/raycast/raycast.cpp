@@ -1,4 +1,5 @@
 // raycast() and its kin: the query around the traversal (search.cpp).
+#include "query/node/scratch.hpp"
 #include "query/raycast/search.hpp"
 
 #include <prolate/tools.hpp>
@@ -34,9 +35,10 @@ namespace {
 
 using query::to_double, query::to_float;
 
-RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
+RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                    const QueryOptions& query_options, bool any, const float* growth = nullptr) {
     using glm::dvec3;
+    if (!query::suffices(context, tree)) return {};
     QueryOptions options = query::sound(query_options);
     options.margin = std::min(options.margin, std::numeric_limits<float>::max()); // an infinite one would make NaNs
     RaycastResult out;
@@ -55,7 +57,7 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Query
                                 .options = options,
                                 .any = any,
                                 .growth = growth,
-                                .stack = context.entries,
+                                .stack = context.entries(),
                                 .stats = {}};
     const bool finished = query::traverse(search);
     out.stats = search.stats;
@@ -80,23 +82,23 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Query
 
 } // namespace
 
-RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
+RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                       const QueryOptions& options) noexcept {
     return cast(tree, pose, ray, context, options, false);
 }
 
-RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, QueryContext& context,
+RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                           const QueryOptions& options) noexcept {
     return cast(tree, pose, ray, context, options, true);
 }
 
 RaycastResult raycast_cut(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
-                          QueryContext& context, const QueryOptions& options) noexcept {
+                          Scratch context, const QueryOptions& options) noexcept {
     return cast(tree, pose, ray, context, options, false, growth.data());
 }
 
 RaycastResult raycast_cut_any(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
-                              QueryContext& context, const QueryOptions& options) noexcept {
+                              Scratch context, const QueryOptions& options) noexcept {
     return cast(tree, pose, ray, context, options, true, growth.data());
 }
 

@@ -34,7 +34,7 @@ public:
     bool run() {
         if (!test(0, 1)) return !leave_aside(0);
         while (size_ > 0) {
-            const QueryContext::Entry e = s_.stack[--size_];
+            const Scratch::Entry e = s_.stack[--size_];
             if (e.bound > limit_) continue;
             const ChildRange children = s_.side.tree.children(e.node_a);
             if (children.count == 0 || e.node_a >= s_.side.limit_from) {

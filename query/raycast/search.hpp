@@ -20,7 +20,7 @@ struct RaycastSearch {
     const QueryOptions options; // sound
     const bool any;             ///< stop at the first hit that is found
     const float* const growth;  ///< of raycast_cut(): by slots; else null
-    QueryContext::Entry* const stack;
+    Scratch::Entry* const stack;
     QueryStats stats;
     bool found = false;
     RayHit best{};           ///< of the placed ray

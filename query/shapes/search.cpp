@@ -80,7 +80,7 @@ private:
     }
 
     Search& s_;
-    QueryContext::Entry* const stack_;
+    Scratch::Entry* const stack_;
     uint32_t size_ = 0;
 };
 

@@ -18,7 +18,7 @@ template <class Shape, class LaneShape> struct ShapeSearch {
     const Shape shape;
     const LaneShape lanes;
     const QueryOptions options; // sound
-    QueryContext::Entry* const stack;
+    Scratch::Entry* const stack;
     OverlapResult result;
     bool root_met = false;
 

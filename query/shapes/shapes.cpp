@@ -1,5 +1,6 @@
 // overlap(): the queries around the traversal (search.cpp).
 #include "query/inside/inside.hpp"
+#include "query/node/scratch.hpp"
 #include "query/shapes/search.hpp"
 
 namespace prolate::query {
@@ -23,34 +24,35 @@ template <class Search> OverlapResult finish(Search& search, Verdict verdict) {
     return search.result;
 }
 
-OverlapResult overlap_with(const TreeView& tree, const RoundedBox& shape, QueryContext& context,
+OverlapResult overlap_with(const TreeView& tree, const RoundedBox& shape, Scratch context,
                            const QueryOptions& options) {
     BoxSearch search{.side = tree_side(tree, options.max_level),
                      .shape = shape,
                      .lanes = lane_rounded_box(shape, tree.raw().lattice()),
                      .options = options,
-                     .stack = context.entries,
+                     .stack = context.entries(),
                      .result = {}};
     Verdict verdict = traverse(search);
     if (verdict == Verdict::separated) verdict = holds(search);
     return finish(search, verdict);
 }
 
-OverlapResult overlap_with(const TreeView& tree, const PlacedHalfSpace& shape, QueryContext& context,
+OverlapResult overlap_with(const TreeView& tree, const PlacedHalfSpace& shape, Scratch context,
                            const QueryOptions& options) {
     HalfSpaceSearch search{.side = tree_side(tree, options.max_level),
                            .shape = shape,
                            .lanes = lane_half_space(shape, tree.raw().lattice()),
                            .options = options,
-                           .stack = context.entries,
+                           .stack = context.entries(),
                            .result = {}};
     return finish(search, traverse(search));
 }
 
 // Shapes of the world: they are placed in the frame of the tree, blown up by the margin.
 template <class Shape>
-OverlapResult overlap_placed(const TreeView& tree, const Pose& pose, const Shape& shape, QueryContext& context,
+OverlapResult overlap_placed(const TreeView& tree, const Pose& pose, const Shape& shape, Scratch context,
                              const QueryOptions& query_options) {
+    if (!suffices(context, tree)) return {};
     const QueryOptions options = sound(query_options);
     return overlap_with(tree, place(shape, pose, options.margin), context, options);
 }
@@ -60,19 +62,19 @@ OverlapResult overlap_placed(const TreeView& tree, const Pose& pose, const Shape
 
 namespace prolate {
 
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const Sphere& sphere, Scratch context,
                       const QueryOptions& options) noexcept {
     return query::overlap_placed(tree, pose, sphere, context, options);
 }
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const Capsule& capsule, Scratch context,
                       const QueryOptions& options) noexcept {
     return query::overlap_placed(tree, pose, capsule, context, options);
 }
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const Box& box, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const Box& box, Scratch context,
                       const QueryOptions& options) noexcept {
     return query::overlap_placed(tree, pose, box, context, options);
 }
-OverlapResult overlap(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, QueryContext& context,
+OverlapResult overlap(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
                       const QueryOptions& options) noexcept {
     return query::overlap_placed(tree, pose, half_space, context, options);
 }

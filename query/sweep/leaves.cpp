@@ -129,10 +129,11 @@ MotionFrame frame(const LatticePose& y_to_x, const LatticeInfo& lattice, const d
 
 } // namespace
 
-SweepSearch::SweepSearch(const OrderedBodies<Motion>& bodies, QueryContext& context,
+SweepSearch::SweepSearch(const OrderedBodies<Motion>& bodies, Scratch context,
                          const SweepOptions& sweep_options) noexcept
     : a(tree_side(bodies.a, sweep_options.max_level)), b(tree_side(bodies.b, sweep_options.max_level)),
-      motion(bodies.place_a, bodies.place_b), options(sound(sweep_options)), entries(context.entries) {
+      motion(bodies.place_a, bodies.place_b), options(sound(sweep_options)), entries(context.entries()),
+      room(heap_room(context, a.tree, b.tree)) {
     move_to(0);
     const PlacedEllipsoid x = place(a.tree.root(), a.tree.scale()),
                           y = place(b.tree.root(), b.tree.scale(), now.b_to_a);

@@ -54,29 +54,28 @@ constexpr uint32_t kTouch = 8, kFlags = kOpenB | kLeaves | kTouch;
 constexpr double kWorthWaiting = 1.0 / 32;
 
 // The time of an entry is a double, rounded down to make room for the flags: its upper half in place of the bound.
-uint64_t time_bits(const QueryContext::Entry& e) {
+uint64_t time_bits(const Scratch::Entry& e) {
     return uint64_t{std::bit_cast<uint32_t>(e.bound)} << 32 | (e.flags & ~kFlags);
 }
-double time_of(const QueryContext::Entry& e) {
+double time_of(const Scratch::Entry& e) {
     return std::bit_cast<double>(time_bits(e));
 }
-QueryContext::Entry entry(uint32_t node_a, uint32_t node_b, double time, uint32_t flags) {
+Scratch::Entry entry(uint32_t node_a, uint32_t node_b, double time, uint32_t flags) {
     const auto bits = std::bit_cast<uint64_t>(time);
     const auto upper = static_cast<uint32_t>(bits >> 32), lower = static_cast<uint32_t>(bits);
     return {node_a, node_b, std::bit_cast<float>(upper), (lower & ~kFlags) | flags};
 }
 struct ByTime {
-    static bool before(const QueryContext::Entry& x, const QueryContext::Entry& y) {
+    static bool before(const Scratch::Entry& x, const Scratch::Entry& y) {
         return time_bits(x) < time_bits(y); // times are not negative
     }
 };
 
 class SweepTraversal {
-    using Entry = QueryContext::Entry;
+    using Entry = Scratch::Entry;
 
 public:
-    explicit SweepTraversal(SweepSearch& search)
-        : s_(search), heap_(search.entries), room_(heap_room(search.a.tree, search.b.tree)) {}
+    explicit SweepTraversal(SweepSearch& search) : s_(search), heap_(search.entries), room_(search.room) {}
 
     void run() {
         s_.open = 0;

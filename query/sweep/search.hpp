@@ -4,6 +4,7 @@
 #include "query/node/lattice.hpp"
 #include "query/node/limits.hpp"
 #include "query/node/order.hpp"
+#include "query/node/scratch.hpp"
 #include "query/node/tree_side.hpp"
 #include "query/sweep/motion.hpp"
 #include "query/sweep/motion_frame.hpp"
@@ -23,7 +24,8 @@ struct SweepSearch {
     TreeSide a, b;
     const PairMotion motion;
     const SweepOptions options; // sound
-    QueryContext::Entry* const entries;
+    Scratch::Entry* const entries;
+    const uint32_t room; ///< for entries that wait in the heap
     QueryStats stats;
 
     double target;        ///< pairs are advanced until they are so near, metres: margin and half of the tolerance
@@ -46,7 +48,7 @@ struct SweepSearch {
     MeetingPair witness;
     glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0}, normal{0, 0, 0}; ///< then, in A's frame
 
-    SweepSearch(const OrderedBodies<Motion>& bodies, QueryContext& context, const SweepOptions& sweep_options) noexcept;
+    SweepSearch(const OrderedBodies<Motion>& bodies, Scratch context, const SweepOptions& sweep_options) noexcept;
 
     void move_to(double t) noexcept;
 

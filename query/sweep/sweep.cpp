@@ -33,8 +33,9 @@ SweepResult run(query::SweepSearch& search, const Motion& motion_a) {
 
 } // namespace
 
-SweepResult sweep(const TreeView& a, const Motion& motion_a, const TreeView& b, const Motion& motion_b,
-                  QueryContext& context, const SweepOptions& options) noexcept {
+SweepResult sweep(const TreeView& a, const Motion& motion_a, const TreeView& b, const Motion& motion_b, Scratch context,
+                  const SweepOptions& options) noexcept {
+    if (!query::suffices(context, a, b)) return {};
     const auto bodies = query::in_canonical_order(a, motion_a, b, motion_b);
     query::SweepSearch search(bodies, context, options);
     SweepResult out = run(search, bodies.place_a);

@@ -36,8 +36,7 @@ float above(double t) {
     return std::nextafter(static_cast<float>(t), std::numeric_limits<float>::infinity());
 }
 
-RayHit first_hit(const World& world, const Ray& ray, QueryContext& context, const QueryOptions& options,
-                 uint32_t mask) {
+RayHit first_hit(const World& world, const Ray& ray, Scratch context, const QueryOptions& options, uint32_t mask) {
     RayHit out;
     const dvec3 o = query::to_double(ray.origin), d = query::to_double(ray.direction);
     if (!std::isfinite(glm::length(o) + glm::length(d)) || d == dvec3(0) || std::isnan(ray.max_t)) return out;
@@ -98,7 +97,7 @@ Bounds about_center(const MovingTree& moving, const SweepOptions& options) {
         {query::round_up(center.x + radius), query::round_up(center.y + radius), query::round_up(center.z + radius)}};
 }
 
-SweepHit first_hit(const World& world, const MovingTree& moving, QueryContext& context, const SweepOptions& options,
+SweepHit first_hit(const World& world, const MovingTree& moving, Scratch context, const SweepOptions& options,
                    uint32_t mask) {
     SweepHit out;
     const Body body{.shape = moving.tree, .pose = {}};

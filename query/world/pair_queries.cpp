@@ -59,7 +59,7 @@ Result<void> collide_pairs(const World& world, std::span<const BodyPair> pairs, 
                            Take&& take) {
     if (const auto good = check(world, pairs, out.size(), slots(caches), workers); !good) return good;
     for_pairs(world, pairs, workers,
-              [&](const BodyPair& pair, const Body& a, const Body& b, QueryContext& context, uint32_t i) {
+              [&](const BodyPair& pair, const Body& a, const Body& b, Scratch context, uint32_t i) {
                   out[i] = take(query::collide(a, b, context, options, Caches<PairCache>{caches}.of(pair)));
               });
     return {};
@@ -84,7 +84,7 @@ Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::
                       std::span<OfPair<DistanceCache>> caches) noexcept {
     if (const auto good = check(world, pairs, out.size(), slots(caches), workers); !good) return good;
     for_pairs(world, pairs, workers,
-              [&](const BodyPair& pair, const Body& a, const Body& b, QueryContext& context, uint32_t i) {
+              [&](const BodyPair& pair, const Body& a, const Body& b, Scratch context, uint32_t i) {
                   out[i] = query::distance(a, b, context, options, Caches<DistanceCache>{caches}.of(pair));
               });
     return {};
@@ -97,7 +97,7 @@ Result<void> sweep(const World& world, std::span<const BodyPair> pairs, std::spa
     if (!std::ranges::all_of(pairs, [&](const BodyPair& p) { return has_motion(p.a) && has_motion(p.b); }))
         return kTooFew;
     for_pairs(world, pairs, workers,
-              [&](const BodyPair& pair, const Body& a, const Body& b, QueryContext& context, uint32_t i) {
+              [&](const BodyPair& pair, const Body& a, const Body& b, Scratch context, uint32_t i) {
                   out[i] = query::sweep(a, motions[pair.a.index], b, motions[pair.b.index], context, options);
               });
     return {};
@@ -107,7 +107,7 @@ Result<void> contacts(const World& world, std::span<const BodyPair> pairs, std::
                       const Workers& workers, const QueryOptions& options) noexcept {
     if (const auto good = check(world, pairs, SIZE_MAX, records.size(), workers); !good) return good;
     for_pairs(world, pairs, workers,
-              [&](const BodyPair& pair, const Body& a, const Body& b, QueryContext& context, uint32_t) {
+              [&](const BodyPair& pair, const Body& a, const Body& b, Scratch context, uint32_t) {
                   PairContacts& record = records[pair.slot];
                   if (record.a != pair.a || record.b != pair.b) {
                       record = {};

@@ -21,7 +21,7 @@ namespace {
 
 using glm::dvec3;
 
-CollideResult on_ground(const Body& body, const HalfSpace& ground, QueryContext& context, const QueryOptions& options) {
+CollideResult on_ground(const Body& body, const HalfSpace& ground, Scratch context, const QueryOptions& options) {
     const OverlapResult r = prolate::overlap(*body.tree(), body.pose, ground, context, options);
     return {.verdict = r.verdict, .enclosed = false, .pair = {r.node, 0, r.triangle, kNoTriangle}, .stats = r.stats};
 }
@@ -103,7 +103,7 @@ template <class Call> auto of(const Probe& probe, Call&& call) {
 
 } // namespace
 
-CollideResult collide(const Body& a, const Body& b, QueryContext& context, const QueryOptions& options,
+CollideResult collide(const Body& a, const Body& b, Scratch context, const QueryOptions& options,
                       PairCache* cache) noexcept {
     const TreeView *x = a.tree(), *y = b.tree();
     if (x != nullptr && y != nullptr) return prolate::collide(*x, a.pose, *y, b.pose, context, options, cache);
@@ -114,7 +114,7 @@ CollideResult collide(const Body& a, const Body& b, QueryContext& context, const
     return out;
 }
 
-DistanceResult distance(const Body& a, const Body& b, QueryContext& context, const DistanceOptions& options,
+DistanceResult distance(const Body& a, const Body& b, Scratch context, const DistanceOptions& options,
                         DistanceCache* cache) noexcept {
     const TreeView *x = a.tree(), *y = b.tree();
     if (x != nullptr && y != nullptr) return prolate::distance(*x, a.pose, *y, b.pose, context, options, cache);
@@ -125,7 +125,7 @@ DistanceResult distance(const Body& a, const Body& b, QueryContext& context, con
     return out;
 }
 
-ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds, QueryContext& context,
+ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds, Scratch context,
                        const QueryOptions& options) noexcept {
     const TreeView *x = a.tree(), *y = b.tree();
     if (x != nullptr && y != nullptr) return prolate::contacts(*x, a.pose, *y, b.pose, manifolds, context, options);
@@ -137,7 +137,7 @@ ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds
     return out;
 }
 
-SweepResult sweep(const Body& a, const Motion& motion_a, const Body& b, const Motion& motion_b, QueryContext& context,
+SweepResult sweep(const Body& a, const Motion& motion_a, const Body& b, const Motion& motion_b, Scratch context,
                   const SweepOptions& options) noexcept {
     const TreeView *x = a.tree(), *y = b.tree();
     if (x != nullptr && y != nullptr) return prolate::sweep(*x, motion_a, *y, motion_b, context, options);
@@ -148,12 +148,12 @@ SweepResult sweep(const Body& a, const Motion& motion_a, const Body& b, const Mo
     return out;
 }
 
-RaycastResult raycast(const Body& body, const Ray& ray, QueryContext& context, const QueryOptions& options) noexcept {
+RaycastResult raycast(const Body& body, const Ray& ray, Scratch context, const QueryOptions& options) noexcept {
     if (body.tree() != nullptr) return prolate::raycast(*body.tree(), body.pose, ray, context, options);
     return raycast(*body.half_space(), ray, sound(options).margin);
 }
 
-Verdict overlap(const Body& body, const Probe& probe, QueryContext& context, const QueryOptions& options) noexcept {
+Verdict overlap(const Body& body, const Probe& probe, Scratch context, const QueryOptions& options) noexcept {
     return of(probe, [&]<class Shape>(const Shape& p) {
         const TreeView* const tree = body.tree();
         if constexpr (std::is_same_v<Shape, PlacedTree>) {

@@ -12,18 +12,18 @@
 
 namespace prolate::query {
 
-CollideResult collide(const Body& a, const Body& b, QueryContext& context, const QueryOptions& options,
+CollideResult collide(const Body& a, const Body& b, Scratch context, const QueryOptions& options,
                       PairCache* cache) noexcept;
-DistanceResult distance(const Body& a, const Body& b, QueryContext& context, const DistanceOptions& options,
+DistanceResult distance(const Body& a, const Body& b, Scratch context, const DistanceOptions& options,
                         DistanceCache* cache) noexcept;
-ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds, QueryContext& context,
+ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds, Scratch context,
                        const QueryOptions& options) noexcept;
-SweepResult sweep(const Body& a, const Motion& motion_a, const Body& b, const Motion& motion_b, QueryContext& context,
+SweepResult sweep(const Body& a, const Motion& motion_a, const Body& b, const Motion& motion_b, Scratch context,
                   const SweepOptions& options) noexcept;
 
 /// One body, and something that is none.
-RaycastResult raycast(const Body& body, const Ray& ray, QueryContext& context, const QueryOptions& options) noexcept;
-Verdict overlap(const Body& body, const Probe& probe, QueryContext& context, const QueryOptions& options) noexcept;
+RaycastResult raycast(const Body& body, const Ray& ray, Scratch context, const QueryOptions& options) noexcept;
+Verdict overlap(const Body& body, const Probe& probe, Scratch context, const QueryOptions& options) noexcept;
 /// A box that holds the probe and all within the margin of it.
 Bounds bounds_of(const Probe& probe, float margin) noexcept;
 
