@@ -1,9 +1,12 @@
 // How the C interface's structs become the C++ ones: checks of pointers, sizes and versions in one place.
 #pragma once
 
+#include <prolate/distance.hpp>
 #include <prolate/error.hpp>
+#include <prolate/jobs.hpp>
 #include <prolate/prolate.h>
 #include <prolate/query.hpp>
+#include <prolate/sweep.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -11,6 +14,7 @@
 #include <cstdint>
 #include <cstring>
 #include <new>
+#include <span>
 #include <type_traits>
 
 namespace prolate::capi {
@@ -74,11 +78,22 @@ inline void hold(const TreeView& view, prolate_tree* tree) {
     new (static_cast<void*>(tree)) TreeHandle{TreeHandle::kOpened, view};
 }
 
-/// The caller's memory as a context; null if it will not do.
-inline QueryContext* context_of(void* scratch, size_t size, size_t count = 1) {
-    const bool aligned = reinterpret_cast<uintptr_t>(scratch) % alignof(QueryContext) == 0;
-    return scratch != nullptr && aligned && size / sizeof(QueryContext) >= count ? static_cast<QueryContext*>(scratch)
-                                                                                 : nullptr;
+/// The caller's memory.
+inline Scratch scratch_of(void* memory, size_t size) {
+    return Scratch(std::span(static_cast<std::byte*>(memory), memory != nullptr ? size : 0));
+}
+/// As `count` contexts, of which workers take one each; null if it will not do.
+inline QueryContext* contexts_of(void* memory, size_t size, size_t count) {
+    const bool aligned = reinterpret_cast<uintptr_t>(memory) % alignof(QueryContext) == 0;
+    return memory != nullptr && aligned && count > 0 && size / sizeof(QueryContext) >= count
+               ? static_cast<QueryContext*>(memory)
+               : nullptr;
+}
+inline Jobs jobs_of(const prolate_jobs* jobs) {
+    return jobs != nullptr ? Jobs{jobs->run, jobs->user, jobs->workers} : Jobs{};
+}
+template <class T> prolate_status status_of(const Result<T>& result) {
+    return result ? PROLATE_OK : static_cast<prolate_status>(result.error().code);
 }
 
 inline prolate_stats stats_of(const QueryStats& s) {
@@ -89,6 +104,28 @@ inline prolate_verdict verdict_of(Verdict v) {
 }
 inline uint64_t tests_of(uint64_t most) {
     return most == 0 ? UINT64_MAX : most;
+}
+inline DistanceOptions options_of(const prolate_distance_options& o) {
+    DistanceOptions out;
+    out.tolerance_absolute = o.tolerance_absolute;
+    if (o.tolerance_relative != 0) out.tolerance_relative = o.tolerance_relative;
+    if (o.max_distance != 0) out.max_distance = o.max_distance;
+    out.max_pair_tests = tests_of(o.max_tests);
+    return out;
+}
+inline SweepOptions options_of(const prolate_sweep_options& o) {
+    SweepOptions out;
+    out.tolerance = o.tolerance, out.max_pair_tests = tests_of(o.max_tests), out.margin = o.margin;
+    return out;
+}
+inline prolate_sweep_result result_of(const SweepResult& r) {
+    auto out = fresh<prolate_sweep_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed;
+    out.time_lower = r.time_lower, out.time_upper = r.time_upper, out.distance = r.distance;
+    out.point_a = same<prolate_vec3>(r.point_a), out.point_b = same<prolate_vec3>(r.point_b);
+    out.normal = same<prolate_vec3>(r.normal);
+    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
+    return out;
 }
 inline QueryOptions options_of(const prolate_query_options& o) {
     return {.max_level = o.max_level == 0 ? kMaxLevels : o.max_level - 1,

@@ -9,6 +9,7 @@
 #include <prolate/points.hpp>
 #include <prolate/prolate.h>
 #include <prolate/raycast.hpp>
+#include <prolate/shapes.hpp>
 #include <prolate/sweep.hpp>
 
 using namespace prolate;
@@ -20,35 +21,30 @@ namespace {
 class Call {
 public:
     template <class Options, class Result>
-    Call(std::initializer_list<const prolate_tree*> trees, void* scratch, size_t scratch_size, const Options* given,
-         Options& options, const Result* result) {
-        context = context_of(scratch, scratch_size);
-        if (context == nullptr || result == nullptr) status = PROLATE_BAD_ARGUMENT;
+    Call(std::initializer_list<const prolate_tree*> trees, void* memory, size_t size, const Options* given,
+         Options& options, const Result* result)
+        : scratch(scratch_of(memory, size)) {
+        if (result == nullptr) status = PROLATE_BAD_ARGUMENT;
         for (const prolate_tree* tree : trees) {
             views_[count_] = view_of(tree);
             if (views_[count_++] == nullptr) status = PROLATE_BAD_ARGUMENT;
         }
-        if (status == PROLATE_OK && (!read(given, options) || !is_sound(result))) status = PROLATE_BAD_STRUCT;
+        if (status != PROLATE_OK) return;
+        if (memory == nullptr || size < (count_ == 2 ? scratch_size(a(), b()) : scratch_size(a())))
+            status = PROLATE_BAD_ARGUMENT;
+        else if (!read(given, options) || !is_sound(result))
+            status = PROLATE_BAD_STRUCT;
     }
     const TreeView& a() const { return *views_[0]; }
     const TreeView& b() const { return *views_[1]; }
 
     prolate_status status = PROLATE_OK;
-    QueryContext* context;
+    const Scratch scratch;
 
 private:
     const TreeView* views_[2] = {};
     size_t count_ = 0;
 };
-
-DistanceOptions options_of(const prolate_distance_options& o) {
-    DistanceOptions out;
-    out.tolerance_absolute = o.tolerance_absolute;
-    if (o.tolerance_relative != 0) out.tolerance_relative = o.tolerance_relative;
-    if (o.max_distance != 0) out.max_distance = o.max_distance;
-    out.max_pair_tests = tests_of(o.max_tests);
-    return out;
-}
 
 prolate_distance_result result_of(const DistanceResult& r) {
     auto out = fresh<prolate_distance_result>();
@@ -82,6 +78,14 @@ bool sound_points(prolate_body body, const prolate_vec3* points, size_t count, c
     return view_of(body.tree) != nullptr && (count == 0 || (points != nullptr && out != nullptr));
 }
 
+bool enough(const void* memory, size_t size, const prolate_tree* tree) {
+    return memory != nullptr && size >= scratch_size(*view_of(tree));
+}
+
+Box box_of(const prolate_shape& s) {
+    return {{same<Vec3>(s.a), same<Quat>(s.rotation)}, same<Vec3>(s.half)};
+}
+
 } // namespace
 
 prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
@@ -93,7 +97,7 @@ prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, si
     static_assert(sizeof(PairCache) == sizeof cache->opaque);
     PairCache own;
     if (cache != nullptr && cache->used == 1) std::memcpy(static_cast<void*>(&own), cache->opaque, sizeof own);
-    const CollideResult r = collide(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), *call.context,
+    const CollideResult r = collide(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
                                     capi::options_of(given), cache != nullptr ? &own : nullptr);
     if (cache != nullptr) std::memcpy(cache->opaque, &own, sizeof own), cache->used = 1;
     auto out = fresh<prolate_collide_result>();
@@ -103,13 +107,30 @@ prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, si
     return PROLATE_OK;
 }
 
+prolate_status prolate_collide_all(prolate_body a, prolate_body b, prolate_meeting_pair* pairs, size_t capacity,
+                                   void* scratch, size_t scratch_size, const prolate_query_options* options,
+                                   prolate_collide_all_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (pairs == nullptr && capacity > 0) return PROLATE_BAD_ARGUMENT;
+    static_assert(sizeof(MeetingPair) == sizeof(prolate_meeting_pair));
+    const CollideAllResult r =
+        collide_all(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose),
+                    {reinterpret_cast<MeetingPair*>(pairs), capacity}, call.scratch, capi::options_of(given));
+    auto out = fresh<prolate_collide_all_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed, out.found = r.found, out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
 prolate_status prolate_distance(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
                                 const prolate_distance_options* options, prolate_distance_result* result) {
     auto given = fresh<prolate_distance_options>();
     const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
-    write(result_of(
-              distance(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), *call.context, ::options_of(given))),
+    write(result_of(distance(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
+                             capi::options_of(given))),
           result);
     return PROLATE_OK;
 }
@@ -122,7 +143,7 @@ prolate_status prolate_contacts(prolate_body a, prolate_body b, prolate_manifold
     if (call.status != PROLATE_OK) return call.status;
     if (manifolds == nullptr) return PROLATE_BAD_ARGUMENT;
     const ContactResult r = with_manifolds(manifolds, [&](ContactManifolds& own) {
-        return contacts(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), own, *call.context,
+        return contacts(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), own, call.scratch,
                         capi::options_of(given));
     });
     write(result_of(r), result);
@@ -135,17 +156,9 @@ prolate_status prolate_sweep(const prolate_tree* a, prolate_motion motion_a, con
     auto given = fresh<prolate_sweep_options>();
     const Call call({a, b}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
-    SweepOptions limits;
-    limits.tolerance = given.tolerance, limits.max_pair_tests = tests_of(given.max_tests), limits.margin = given.margin;
-    const SweepResult r =
-        sweep(call.a(), same<Motion>(motion_a), call.b(), same<Motion>(motion_b), *call.context, limits);
-    auto out = fresh<prolate_sweep_result>();
-    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed;
-    out.time_lower = r.time_lower, out.time_upper = r.time_upper, out.distance = r.distance;
-    out.point_a = same<prolate_vec3>(r.point_a), out.point_b = same<prolate_vec3>(r.point_b);
-    out.normal = same<prolate_vec3>(r.normal);
-    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
-    write(out, result);
+    const SweepResult r = sweep(call.a(), same<Motion>(motion_a), call.b(), same<Motion>(motion_b), call.scratch,
+                                capi::options_of(given));
+    write(capi::result_of(r), result);
     return PROLATE_OK;
 }
 
@@ -155,11 +168,44 @@ prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch
     const Call call({body.tree}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
     const RaycastResult r =
-        raycast(call.a(), same<Pose>(body.pose), same<Ray>(ray), *call.context, capi::options_of(given));
+        raycast(call.a(), same<Pose>(body.pose), same<Ray>(ray), call.scratch, capi::options_of(given));
     auto out = fresh<prolate_raycast_result>();
     out.verdict = verdict_of(r.verdict), out.t = r.t, out.clear = r.clear;
     out.point = same<prolate_vec3>(r.point), out.normal = same<prolate_vec3>(r.normal);
     out.node = r.node, out.triangle = r.triangle, out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_overlap(prolate_body body, const prolate_shape* shape, void* scratch, size_t scratch_size,
+                               const prolate_query_options* options, prolate_overlap_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (shape == nullptr) return PROLATE_BAD_ARGUMENT;
+    const auto with = [&](const auto& s) {
+        return overlap(call.a(), same<Pose>(body.pose), s, call.scratch, capi::options_of(given));
+    };
+    OverlapResult r;
+    switch (shape->kind) {
+    case PROLATE_SPHERE:
+        r = with(Sphere{same<Vec3>(shape->a), shape->radius});
+        break;
+    case PROLATE_CAPSULE:
+        r = with(Capsule{same<Vec3>(shape->a), same<Vec3>(shape->b), shape->radius});
+        break;
+    case PROLATE_BOX:
+        r = with(box_of(*shape));
+        break;
+    case PROLATE_HALF_SPACE:
+        r = with(HalfSpace{same<Vec3>(shape->a), shape->radius});
+        break;
+    default:
+        return PROLATE_BAD_OPTIONS;
+    }
+    auto out = fresh<prolate_overlap_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed, out.node = r.node, out.triangle = r.triangle;
+    out.stats = stats_of(r.stats);
     write(out, result);
     return PROLATE_OK;
 }
@@ -170,8 +216,8 @@ prolate_status prolate_half_space_distance(prolate_body body, prolate_half_space
     auto given = fresh<prolate_distance_options>();
     const Call call({body.tree}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
-    write(result_of(distance(call.a(), same<Pose>(body.pose), same<HalfSpace>(half_space), *call.context,
-                             ::options_of(given))),
+    write(result_of(distance(call.a(), same<Pose>(body.pose), same<HalfSpace>(half_space), call.scratch,
+                             capi::options_of(given))),
           result);
     return PROLATE_OK;
 }
@@ -184,18 +230,30 @@ prolate_status prolate_half_space_contacts(prolate_body body, prolate_half_space
     if (call.status != PROLATE_OK) return call.status;
     if (manifolds == nullptr) return PROLATE_BAD_ARGUMENT;
     const ContactResult r = with_manifolds(manifolds, [&](ContactManifolds& own) {
-        return contacts(call.a(), same<Pose>(body.pose), same<HalfSpace>(half_space), own, *call.context,
+        return contacts(call.a(), same<Pose>(body.pose), same<HalfSpace>(half_space), own, call.scratch,
                         capi::options_of(given));
     });
     write(result_of(r), result);
     return PROLATE_OK;
 }
 
+prolate_status prolate_half_space_sweep(const prolate_tree* tree, prolate_motion motion, prolate_half_space half_space,
+                                        void* scratch, size_t scratch_size, const prolate_sweep_options* options,
+                                        prolate_sweep_result* result) {
+    auto given = fresh<prolate_sweep_options>();
+    const Call call({tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    write(capi::result_of(sweep(call.a(), same<Motion>(motion), same<HalfSpace>(half_space), call.scratch,
+                                capi::options_of(given))),
+          result);
+    return PROLATE_OK;
+}
+
 prolate_status prolate_signed_distances(prolate_body body, const prolate_vec3* points, size_t count,
                                         double max_distance, void* scratch, size_t scratch_size,
                                         prolate_signed_distance* results) {
-    QueryContext* const context = context_of(scratch, scratch_size);
-    if (context == nullptr || !sound_points(body, points, count, results)) return PROLATE_BAD_ARGUMENT;
+    if (!sound_points(body, points, count, results) || !enough(scratch, scratch_size, body.tree))
+        return PROLATE_BAD_ARGUMENT;
     PointOptions options;
     if (max_distance != 0) options.max_distance = max_distance;
     constexpr size_t kAtOnce = 32; // points of one batch follow each other closely
@@ -203,7 +261,7 @@ prolate_status prolate_signed_distances(prolate_body body, const prolate_vec3* p
     for (size_t i = 0; i < count; i += kAtOnce) {
         const size_t now = std::min(kAtOnce, count - i);
         signed_distance(*view_of(body.tree), same<Pose>(body.pose), {reinterpret_cast<const Vec3*>(points) + i, now},
-                        {some, now}, *context, options);
+                        {some, now}, scratch_of(scratch, scratch_size), options);
         for (size_t k = 0; k < now; ++k)
             results[i + k] = {some[k].lower,
                               some[k].upper,
@@ -218,11 +276,11 @@ prolate_status prolate_signed_distances(prolate_body body, const prolate_vec3* p
 
 prolate_status prolate_contains(prolate_body body, const prolate_vec3* points, size_t count, void* scratch,
                                 size_t scratch_size, prolate_verdict* sides) {
-    QueryContext* const context = context_of(scratch, scratch_size);
-    if (context == nullptr || !sound_points(body, points, count, sides)) return PROLATE_BAD_ARGUMENT;
+    if (!sound_points(body, points, count, sides) || !enough(scratch, scratch_size, body.tree))
+        return PROLATE_BAD_ARGUMENT;
     static_assert(sizeof(Verdict) == sizeof *sides);
     contains(*view_of(body.tree), same<Pose>(body.pose), {reinterpret_cast<const Vec3*>(points), count},
-             {reinterpret_cast<Verdict*>(sides), count}, *context);
+             {reinterpret_cast<Verdict*>(sides), count}, scratch_of(scratch, scratch_size));
     return PROLATE_OK;
 }
 

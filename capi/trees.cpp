@@ -83,6 +83,12 @@ size_t prolate_scratch_size(void) {
     return sizeof(QueryContext);
 }
 
+size_t prolate_scratch_size_of(const prolate_tree* a, const prolate_tree* b) {
+    const TreeView *const x = view_of(a), *const y = view_of(b);
+    if (x == nullptr) return prolate_scratch_size();
+    return y != nullptr ? scratch_size(*x, *y) : scratch_size(*x);
+}
+
 prolate_status prolate_tree_open(const void* bytes, size_t count, prolate_tree* tree, prolate_error* error) {
     if ((bytes == nullptr && count > 0) || tree == nullptr) return failed(PROLATE_BAD_ARGUMENT, error);
     return open_in({static_cast<const std::byte*>(bytes), count}, tree, error);
@@ -106,6 +112,15 @@ prolate_status prolate_tree_load(const char* path, void* buffer, size_t capacity
     if (size > capacity) return failed(PROLATE_NO_ROOM, error);
     if (std::fread(buffer, 1, size, file.get()) != size) return io("cannot read the file");
     return open_in({static_cast<const std::byte*>(buffer), size}, tree, error);
+}
+
+prolate_status prolate_tree_scale(const prolate_tree* tree, float scale, prolate_tree* scaled, prolate_error* error) {
+    const TreeView* const view = view_of(tree);
+    if (view == nullptr || scaled == nullptr) return failed(PROLATE_BAD_ARGUMENT, error);
+    const auto made = view->scaled(scale);
+    if (!made) return failed(made.error(), error);
+    hold(*made, scaled);
+    return PROLATE_OK;
 }
 
 prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info* info) {

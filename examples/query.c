@@ -21,9 +21,8 @@ int main(int argc, char** argv) {
     if (argc != 4) return fputs("usage: query A.etree B.etree X\n", stderr), 2;
     prolate_tree a, b;
     void *const bytes_a = load(argv[1], &a), *const bytes_b = load(argv[2], &b);
-    const size_t scratch_size = (prolate_scratch_size() + 63) / 64 * 64;
-    void* const scratch =
-        aligned_alloc(64, scratch_size); /* keep it for all queries; it is too large for a small stack */
+    const size_t scratch_size = prolate_scratch_size_of(&a, &b);
+    void* const scratch = malloc(scratch_size); /* some KiB: keep it for all queries of these trees */
 
     const prolate_pose here = {{0, 0, 0}, {0, 0, 0, 1}}, there = {{strtof(argv[3], NULL), 0, 0}, {0, 0, 0, 1}};
     prolate_collide_result result = PROLATE_INIT(prolate_collide_result);

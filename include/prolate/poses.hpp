@@ -19,5 +19,9 @@ Result<void> collide_poses(const TreeView& a, std::span<const Pose> poses_a, con
                            std::span<const Pose> poses_b, std::span<CollideResult> out,
                            std::span<QueryContext> contexts, const Jobs& jobs = {},
                            const QueryOptions& options = {}) noexcept;
+/// The same, but only the verdicts: one byte a pose.
+Result<void> collide_poses(const TreeView& a, std::span<const Pose> poses_a, const TreeView& b,
+                           std::span<const Pose> poses_b, std::span<Verdict> out, std::span<QueryContext> contexts,
+                           const Jobs& jobs = {}, const QueryOptions& options = {}) noexcept;
 
 } // namespace prolate

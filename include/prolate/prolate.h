@@ -8,9 +8,11 @@
  *    that a program runs with later libraries of the same version. Anything else is PROLATE_BAD_STRUCT.
  *  - Options may be NULL for the defaults, and so may caches and errors. All other pointers must not be NULL:
  *    PROLATE_BAD_ARGUMENT.
- *  - Queries allocate nothing: they work in `scratch`, memory of the caller's, at least prolate_scratch_size() bytes,
- *    aligned to 64, for one query at a time. It needs no initialisation. Only the functions that make primitives and
- *    worlds allocate, the latter by the caller's functions.
+ *  - Queries allocate nothing: they work in `scratch`, memory of the caller's of any alignment, for one query at a
+ * time. prolate_scratch_size_of() says how much its trees need, a few KiB; with prolate_scratch_size() bytes, some
+ * queries make fewer tests (query.hpp: Scratch). It needs no initialisation. Only what has workers needs the latter for
+ * each, aligned to 64. Only the functions that make primitives and worlds allocate, the latter by the caller's
+ * functions.
  *  - Trees may be shared between threads. Nothing has hidden state.
  *  - Lengths in metres or any unit used consistently; a pose rotates first, then translates; quaternions are
  *    x, y, z, w.
@@ -70,7 +72,7 @@ typedef struct prolate_error {
 
 /** PROLATE_API_VERSION of the library. */
 PROLATE_API uint32_t prolate_api_version(void);
-/** Bytes of scratch that every query suffices with. */
+/** Bytes of scratch that are enough for every query of all trees. */
 PROLATE_API size_t prolate_scratch_size(void);
 
 /* ---- values ---- */
@@ -120,6 +122,10 @@ typedef struct prolate_tree_info {
     double volume, center[3], inertia[6]; /**< mass.hpp, at density 1: xx, yy, zz, xy, xz, yz */
     double volume_error, center_error, inertia_error;
 } prolate_tree_info;
+/** query.hpp: scratch_size(): bytes that the queries of `a` need at least, or those of `a` and `b` if that is not NULL.
+ * Of trees that are not open, prolate_scratch_size(). */
+PROLATE_API size_t prolate_scratch_size_of(const prolate_tree* a, const prolate_tree* b);
+
 PROLATE_API prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info* info);
 
 /** tree.hpp: TreeView::scaled(). The same bytes, seen `scale` times as large. `scaled` may be `tree`. */
@@ -322,8 +328,7 @@ PROLATE_API prolate_status prolate_half_space_contacts(prolate_body body, prolat
 
 PROLATE_API prolate_status prolate_half_space_sweep(const prolate_tree* tree, prolate_motion motion,
                                                     prolate_half_space half_space, void* scratch, size_t scratch_size,
-                                                    const prolate_sweep_options* options,
-                                                    prolate_sweep_result* result);
+                                                    const prolate_sweep_options* options, prolate_sweep_result* result);
 
 /** points.hpp: SignedDistance, of many points. */
 typedef struct prolate_signed_distance {

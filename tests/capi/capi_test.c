@@ -187,6 +187,87 @@ static void give(void* user, void* memory, size_t size, size_t alignment) {
     free(memory);
 }
 
+static void test_scaled_and_shapes(void) {
+    prolate_tree twice;
+    prolate_error error = {NULL, 0};
+    CHECK_OK(prolate_tree_scale(&box, 2, &twice, &error));
+    CHECK_STATUS(prolate_tree_scale(&box, 0, &twice, &error), PROLATE_BAD_OPTIONS);
+    CHECK_STATUS(prolate_tree_scale(NULL, 1, &twice, &error), PROLATE_BAD_ARGUMENT);
+    prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
+    CHECK_OK(prolate_distance(at(&twice, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
+    CHECK(d.lower <= 1.5 && d.upper >= 1.5 && d.upper - d.lower < 1e-5);
+
+    /* Scratch of the least size, at any address; and less. */
+    const size_t least = prolate_scratch_size_of(&box, &ball);
+    CHECK(least < 8192 && prolate_scratch_size_of(NULL, NULL) == prolate_scratch_size());
+    unsigned char small[8192];
+    CHECK_OK(prolate_distance(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), small + 1, least, NULL, &d));
+    CHECK(d.lower > 1.49 && d.verdict == PROLATE_SEPARATED);
+    CHECK_STATUS(prolate_distance(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), small, least - 1, NULL, &d),
+                 PROLATE_BAD_ARGUMENT);
+
+    prolate_meeting_pair pairs[200];
+    prolate_collide_all_result all = PROLATE_INIT(prolate_collide_all_result);
+    CHECK_OK(prolate_collide_all(at(&box, 0, 0, 0), at(&box, 0.3f, 0.2f, 0.1f), pairs, 200, scratch, scratch_size, NULL,
+                                 &all));
+    CHECK(all.verdict == PROLATE_OVERLAPPING && all.found > 3 && all.found < 200 && pairs[0].triangle_a < 12);
+    const uint64_t found = all.found;
+    CHECK_OK(
+        prolate_collide_all(at(&box, 0, 0, 0), at(&box, 0.3f, 0.2f, 0.1f), NULL, 0, scratch, scratch_size, NULL, &all));
+    CHECK(all.found == found);
+    CHECK_STATUS(prolate_collide_all(at(&box, 0, 0, 0), at(&box, 0, 0, 0), NULL, 5, scratch, scratch_size, NULL, &all),
+                 PROLATE_BAD_ARGUMENT);
+
+    prolate_shape shape;
+    memset(&shape, 0, sizeof shape);
+    prolate_overlap_result o = PROLATE_INIT(prolate_overlap_result);
+    const struct {
+        prolate_shape_kind kind;
+        float near, far; /* along x, where it meets the box, and where not */
+    } cases[] = {{PROLATE_SPHERE, 0.9f, 1.1f}, {PROLATE_CAPSULE, 0.9f, 1.1f}, {PROLATE_BOX, 0.9f, 1.1f}};
+    shape.radius = 0.5f, shape.half = (prolate_vec3){0.5f, 0.1f, 0.1f}, shape.rotation = upright;
+    for (size_t i = 0; i < 3; ++i) {
+        shape.kind = cases[i].kind;
+        shape.a.x = cases[i].near, shape.b = (prolate_vec3){cases[i].near, 0, 1};
+        CHECK_OK(prolate_overlap(at(&box, 0, 0, 0), &shape, scratch, scratch_size, NULL, &o));
+        CHECK(o.verdict == PROLATE_OVERLAPPING && o.triangle < 12);
+        shape.a.x = cases[i].far, shape.b.x = cases[i].far;
+        CHECK_OK(prolate_overlap(at(&box, 0, 0, 0), &shape, scratch, scratch_size, NULL, &o));
+        CHECK(o.verdict == PROLATE_SEPARATED);
+    }
+    shape.kind = PROLATE_HALF_SPACE, shape.a = (prolate_vec3){0, 0, 1}, shape.radius = -0.6f;
+    CHECK_OK(prolate_overlap(at(&box, 0, 0, 0), &shape, scratch, scratch_size, NULL, &o));
+    CHECK(o.verdict == PROLATE_SEPARATED);
+    shape.kind = 9;
+    CHECK_STATUS(prolate_overlap(at(&box, 0, 0, 0), &shape, scratch, scratch_size, NULL, &o), PROLATE_BAD_OPTIONS);
+    CHECK_STATUS(prolate_overlap(at(&box, 0, 0, 0), NULL, scratch, scratch_size, NULL, &o), PROLATE_BAD_ARGUMENT);
+
+    const prolate_motion fall = {{{0, 0, 5}, upright}, {0, 0, -9}, {0, 0, 0}, {0, 0, 0}};
+    prolate_sweep_result s = PROLATE_INIT(prolate_sweep_result);
+    CHECK_OK(prolate_half_space_sweep(&box, fall, (prolate_half_space){{0, 0, 1}, 0}, scratch, scratch_size, NULL, &s));
+    CHECK(s.verdict == PROLATE_OVERLAPPING && fabs(s.time_upper - 0.5) < 1e-3);
+
+    const prolate_ellipsoid e = {{0, 0, 0}, 1, 0, 1, 0, 0, 2};
+    const prolate_pose here = {{0, 0, 0}, upright}, there = {{5, 0, 0}, upright};
+    prolate_verdict verdict = PROLATE_UNDECIDED;
+    prolate_pair_distance gap;
+    CHECK_OK(prolate_pair_collide(&e, here, &e, there, 0, &verdict));
+    CHECK(verdict == PROLATE_SEPARATED);
+    CHECK_OK(prolate_pair_distance_of(&e, here, &e, there, 0, &gap));
+    CHECK(gap.lower <= 3 && gap.upper >= 3 && gap.upper - gap.lower < 1e-5f);
+    CHECK_STATUS(prolate_pair_collide(NULL, here, &e, there, 0, &verdict), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_pair_distance_of(&e, here, &e, there, 0, NULL), PROLATE_BAD_ARGUMENT);
+
+    const prolate_pose many[] = {here, there, {{0.9f, 0, 0}, upright}};
+    prolate_verdict verdicts[3];
+    CHECK_OK(prolate_collide_poses(&box, &here, 1, &box, many, 3, NULL, scratch, scratch_size, NULL, verdicts));
+    CHECK(verdicts[0] == PROLATE_OVERLAPPING && verdicts[1] == PROLATE_SEPARATED && verdicts[2] == PROLATE_OVERLAPPING);
+    CHECK_STATUS(prolate_collide_poses(&box, many, 2, &box, many, 3, NULL, scratch, scratch_size, NULL, verdicts),
+                 PROLATE_BAD_OPTIONS);
+    CHECK_STATUS(prolate_collide_poses(&box, many, 2, &box, NULL, 3, NULL, scratch, scratch_size, NULL, verdicts),
+                 PROLATE_BAD_ARGUMENT);
+}
+
 static void test_worlds(void) {
     prolate_world* world = NULL;
     const prolate_allocator allocator = {take, give, NULL}, none = {take_nothing, give, NULL},
@@ -206,33 +287,129 @@ static void test_worlds(void) {
     }
     int runs = 0;
     const prolate_jobs jobs = {run, &runs, 2};
+    void* const both = aligned_alloc(64, 2 * scratch_size); /* one for each worker */
+    const prolate_workers two = {&jobs, both, 2 * scratch_size}, too_few = {&jobs, both, scratch_size},
+                          one = {NULL, scratch, scratch_size};
     const prolate_body_pair* pairs = NULL;
     size_t count = 0;
     CHECK_OK(prolate_world_update_pairs(world, &jobs, &pairs, &count));
     CHECK(count >= 11);
     prolate_verdict* const verdicts = malloc(count + 1);
-    void* const both = aligned_alloc(64, 2 * scratch_size); /* one for each worker */
-    CHECK_STATUS(prolate_world_collide(world, pairs, count, &jobs, both, scratch_size, NULL, verdicts),
-                 PROLATE_BAD_ARGUMENT);
-    CHECK_OK(prolate_world_collide(world, pairs, count, &jobs, both, 2 * scratch_size, NULL, verdicts));
+    CHECK_STATUS(prolate_world_collide(world, pairs, count, &too_few, NULL, verdicts), PROLATE_BAD_ARGUMENT);
+    CHECK_OK(prolate_world_collide(world, pairs, count, &two, NULL, verdicts));
     int meeting = 0;
     for (size_t i = 0; i < count; ++i) meeting += verdicts[i] == PROLATE_OVERLAPPING;
     CHECK(meeting == 11 && runs > 0);
-    CHECK_OK(prolate_world_collide(world, pairs, count, NULL, scratch, scratch_size, NULL, verdicts));
+    CHECK_OK(prolate_world_collide(world, pairs, count, &one, NULL, verdicts));
     free(verdicts);
-    free(both);
+    prolate_distance_answer* const distances = calloc(count, sizeof *distances);
+    CHECK_OK(prolate_world_distance(world, pairs, count, &two, NULL, distances));
+    for (size_t i = 0; i < count; ++i) CHECK(distances[i].lower <= distances[i].upper);
+    free(distances);
     CHECK_OK(prolate_world_move(world, ids[0], (prolate_pose){{50, 0, 0}, upright}));
     CHECK_OK(prolate_world_remove(world, ids[4]));
     CHECK_STATUS(prolate_world_remove(world, ids[4]), PROLATE_BAD_ID);
     CHECK_STATUS(prolate_world_move(world, ids[4], (prolate_pose){{50, 0, 0}, upright}), PROLATE_BAD_ID);
     prolate_verdict unused[64];
-    CHECK_STATUS(prolate_world_collide(world, pairs, count, NULL, scratch, scratch_size, NULL, unused), PROLATE_BAD_ID);
+    CHECK_STATUS(prolate_world_collide(world, pairs, count, &one, NULL, unused), PROLATE_BAD_ID);
     CHECK_OK(prolate_world_update_pairs(world, NULL, &pairs, &count));
     CHECK_STATUS(prolate_world_insert(world, NULL, &ids[0]), PROLATE_BAD_ARGUMENT);
     body.version = 9;
     CHECK_STATUS(prolate_world_insert(world, &body, &ids[0]), PROLATE_BAD_STRUCT);
+    free(both);
     prolate_world_destroy(world);
     prolate_world_destroy(NULL);
+    CHECK(allocated == 0);
+}
+
+/* A compound stands on the ground: contacts, events, rays, probes and sweeps; then it is taken away. */
+static void test_scene(void) {
+    prolate_world* world = NULL;
+    const prolate_allocator allocator = {take, give, NULL};
+    CHECK_OK(prolate_world_create(NULL, &allocator, &world));
+    const prolate_workers one = {NULL, scratch, scratch_size};
+    const prolate_half_space floor = {{0, 0, 1}, 0};
+    prolate_world_body body = PROLATE_INIT(prolate_world_body);
+    prolate_body_id ground, id, part, owner;
+    CHECK_STATUS(prolate_world_insert(world, &body, &ground), PROLATE_BAD_ARGUMENT); /* neither */
+    body.half_space = &floor;
+    CHECK_OK(prolate_world_insert(world, &body, &ground));
+    body.tree = &box; /* both */
+    CHECK_STATUS(prolate_world_insert(world, &body, &id), PROLATE_BAD_ARGUMENT);
+    const prolate_part parts[] = {{&ball, {{3, 0, 0.5f}, upright}}};
+    body.half_space = NULL, body.parts = parts, body.part_count = 1, body.user = 7;
+    body.pose = (prolate_pose){{0, 0, 0.49f}, upright};
+    CHECK_OK(prolate_world_insert(world, &body, &id));
+    body.parts = NULL;
+    CHECK_STATUS(prolate_world_insert(world, &body, &part), PROLATE_BAD_ARGUMENT);
+    CHECK_OK(prolate_world_part(world, id, 1, &part));
+    CHECK_STATUS(prolate_world_part(world, id, 2, &owner), PROLATE_BAD_ID);
+    CHECK_OK(prolate_world_body_of(world, part, &owner));
+    CHECK(owner.index == id.index && owner.generation == id.generation);
+    prolate_pose pose;
+    uint64_t user = 0;
+    CHECK_OK(prolate_world_find(world, part, &pose, &user));
+    CHECK(user == 7 && fabsf(pose.translation.x - 3) < 1e-6f && fabsf(pose.translation.z - 0.99f) < 1e-6f);
+    CHECK_STATUS(prolate_world_find(world, (prolate_body_id){9, 9}, &pose, NULL), PROLATE_BAD_ID);
+
+    const prolate_body_pair* pairs = NULL;
+    size_t count = 0, events = 0;
+    uint32_t slots = 0;
+    CHECK_OK(prolate_world_update_pairs(world, NULL, &pairs, &count));
+    CHECK_OK(prolate_world_slot_count(world, &slots));
+    CHECK(count == 2 && slots == 2);
+    prolate_pair_contacts records[2];
+    memset(records, 0, sizeof records);
+    prolate_contact_event event[8];
+    CHECK_OK(prolate_world_contacts(world, pairs, count, &one, NULL, records, slots));
+    CHECK_STATUS(prolate_world_contacts(world, pairs, count, &one, NULL, records, 1), PROLATE_BAD_OPTIONS);
+    CHECK(records[0].touching && records[0].verdict == PROLATE_OVERLAPPING && records[0].manifolds.count == 1);
+    CHECK(records[0].manifolds.manifolds[0].count == 4 && records[0].manifolds.manifolds[0].normal.z == 1);
+    CHECK_OK(prolate_world_contact_events(world, records, slots, event, 8, &events));
+    CHECK(events == 2 && event[0].kind == PROLATE_CONTACT_BEGAN && event[1].kind == PROLATE_CONTACT_BEGAN);
+    CHECK_OK(prolate_world_contact_events(world, records, slots, event, 8, &events));
+    CHECK(events == 2 && event[0].kind == PROLATE_CONTACT_STAYS);
+    CHECK_STATUS(prolate_world_contact_events(world, records, slots, event, 1, &events), PROLATE_BAD_OPTIONS);
+
+    const prolate_ray rays[] = {{{0, 0, 9}, {0, 0, -1}, INFINITY},
+                                {{3, 0, 9}, {0, 0, -1}, INFINITY},
+                                {{9, 0, 9}, {0, 0, -1}, INFINITY},
+                                {{9, 0, 9}, {0, 0, 1}, INFINITY}};
+    prolate_ray_hit hits[4];
+    CHECK_OK(prolate_world_raycast(world, rays, 4, UINT32_MAX, &one, NULL, hits));
+    CHECK(hits[0].body.index == id.index && fabs(hits[0].t - 8.01) < 1e-5 && hits[0].normal.z > 0.99f);
+    CHECK(hits[1].body.index == part.index && hits[2].body.index == ground.index && fabs(hits[2].t - 9) < 1e-6);
+    CHECK(hits[3].verdict == PROLATE_SEPARATED && hits[3].body.generation == 0);
+
+    prolate_shape shape;
+    memset(&shape, 0, sizeof shape);
+    shape.a = (prolate_vec3){0, 0, 0.5f}, shape.radius = 1;
+    prolate_body_id met[1];
+    size_t found = 0;
+    CHECK_OK(prolate_world_overlap(world, &shape, UINT32_MAX, &one, NULL, met, 1, &found));
+    CHECK(found == 2 && met[0].index == ground.index);
+    shape.kind = PROLATE_HALF_SPACE;
+    CHECK_STATUS(prolate_world_overlap(world, &shape, UINT32_MAX, &one, NULL, met, 1, &found), PROLATE_BAD_OPTIONS);
+
+    prolate_sweep_result s = PROLATE_INIT(prolate_sweep_result);
+    const prolate_motion fall = {{{0, 0, 5}, upright}, {0, 0, -5}, {0, 0, 0}, {0, 0, 0}};
+    CHECK_OK(prolate_world_sweep(world, &box, fall, UINT32_MAX, &one, NULL, &owner, &s));
+    CHECK(owner.index == id.index && s.verdict == PROLATE_OVERLAPPING && s.time_upper > 0.69 && s.time_upper < 0.71);
+
+    const prolate_pose away = {{0, 0, 90}, upright};
+    prolate_error error = {NULL, 0};
+    CHECK_STATUS(prolate_world_move_many(world, &part, &away, 1, NULL, &error), PROLATE_BAD_ID);
+    CHECK(error.what != NULL && error.where == 0);
+    CHECK_OK(prolate_world_move_many(world, &id, &away, 1, NULL, &error));
+    CHECK_OK(prolate_world_update_pairs(world, NULL, &pairs, &count));
+    CHECK(count == 0);
+    CHECK_OK(prolate_world_ended_pairs(world, &pairs, &count));
+    CHECK(count == 2 && pairs[0].a.index == ground.index);
+    CHECK_OK(prolate_world_contact_events(world, records, slots, event, 8, &events));
+    CHECK(events == 2 && event[0].kind == PROLATE_CONTACT_ENDED);
+    CHECK_OK(prolate_world_refilter(world, id, 1, 0));
+    CHECK_OK(prolate_world_remove(world, id));
+    prolate_world_destroy(world);
     CHECK(allocated == 0);
 }
 
@@ -245,9 +422,7 @@ static void test_bad_input(void) {
     CHECK_STATUS(prolate_collide(good, at(&never_opened, 0, 0, 0), scratch, scratch_size, NULL, NULL, &c),
                  PROLATE_BAD_ARGUMENT);
     CHECK_STATUS(prolate_collide(good, good, NULL, scratch_size, NULL, NULL, &c), PROLATE_BAD_ARGUMENT);
-    CHECK_STATUS(prolate_collide(good, good, scratch, prolate_scratch_size() - 1, NULL, NULL, &c),
-                 PROLATE_BAD_ARGUMENT);
-    CHECK_STATUS(prolate_collide(good, good, (char*)scratch + 4, scratch_size, NULL, NULL, &c), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide(good, good, scratch, 100, NULL, NULL, &c), PROLATE_BAD_ARGUMENT);
     CHECK_STATUS(prolate_collide(good, good, scratch, scratch_size, NULL, NULL, NULL), PROLATE_BAD_ARGUMENT);
     c.version = 2;
     CHECK_STATUS(prolate_collide(good, good, scratch, scratch_size, NULL, NULL, &c), PROLATE_BAD_STRUCT);
@@ -287,7 +462,9 @@ int main(void) {
     test_trees();
     test_pairs();
     test_one_body();
+    test_scaled_and_shapes();
     test_worlds();
+    test_scene();
     test_bad_input();
     free(scratch);
     if (failures == 0) puts("the C interface answers as it should");

@@ -41,6 +41,60 @@ class DistanceResult(c.Structure):
                 ("pair", Pair), ("stats", Stats)]
 
 
+class Id(c.Structure):
+    _fields_ = [("index", c.c_uint32), ("generation", c.c_uint32)]
+
+
+class HalfSpace(c.Structure):
+    _fields_ = [("normal", Vec3), ("offset", c.c_float)]
+
+
+class WorldBody(c.Structure):
+    _fields_ = [("size", c.c_uint32), ("version", c.c_uint32), ("tree", c.POINTER(Tree)), ("pose", Pose),
+                ("user", c.c_uint64), ("layers", c.c_uint32), ("mask", c.c_uint32), ("margin", c.c_float),
+                ("half_space", c.POINTER(HalfSpace)), ("parts", c.c_void_p), ("part_count", c.c_size_t)]
+
+
+class BodyPair(c.Structure):
+    _fields_ = [("a", Id), ("b", Id), ("slot", c.c_uint32), ("begins", c.c_bool), ("moved", c.c_bool)]
+
+
+class Workers(c.Structure):
+    _fields_ = [("jobs", c.c_void_p), ("scratch", c.c_void_p), ("scratch_size", c.c_size_t)]
+
+
+class Ray(c.Structure):
+    _fields_ = [("origin", Vec3), ("direction", Vec3), ("max_t", c.c_float)]
+
+
+class RayHit(c.Structure):
+    _fields_ = [("body", Id), ("verdict", c.c_uint8), ("t", c.c_double), ("clear", c.c_double), ("point", Vec3),
+                ("normal", Vec3), ("node", c.c_uint32), ("triangle", c.c_uint32)]
+
+
+def world(lib, tree, scratch, size):
+    """A box on the ground: do they meet, and what does a ray hit?"""
+    handle = c.c_void_p()
+    assert lib.prolate_world_create(None, None, c.byref(handle)) == 0
+    floor, ids = HalfSpace(Vec3(0, 0, 1), 0), [Id(), Id()]
+    ground = WorldBody(size=c.sizeof(WorldBody), version=1, half_space=c.pointer(floor))
+    box = WorldBody(size=c.sizeof(WorldBody), version=1, tree=c.pointer(tree),
+                    pose=Pose(Vec3(0, 0, 0.49), Quat(0, 0, 0, 1)))
+    for body, of in zip((ground, box), ids):
+        assert lib.prolate_world_insert(handle, c.byref(body), c.byref(of)) == 0
+    pairs, count = c.POINTER(BodyPair)(), c.c_size_t()
+    assert lib.prolate_world_update_pairs(handle, None, c.byref(pairs), c.byref(count)) == 0
+    assert count.value == 1 and pairs[0].begins and pairs[0].b.index == ids[1].index
+    workers, verdicts = Workers(None, scratch, size), (c.c_uint8 * 1)()
+    assert lib.prolate_world_collide(handle, pairs, count, c.byref(workers), None, verdicts) == 0
+    assert verdicts[0] == 1
+    ray, hit = Ray(Vec3(0, 0, 5), Vec3(0, 0, -1), float("inf")), RayHit()
+    assert lib.prolate_world_raycast(handle, c.byref(ray), c.c_size_t(1), c.c_uint32(2**32 - 1), c.byref(workers), None,
+                                     c.byref(hit)) == 0
+    assert hit.body.index == ids[1].index and abs(hit.t - 4.01) < 1e-5 and hit.triangle < 12
+    lib.prolate_world_destroy(handle)
+
+
 def main(path):
     lib = c.CDLL(path)
     lib.prolate_scratch_size.restype = c.c_size_t
@@ -65,6 +119,7 @@ def main(path):
     assert abs(result.point_b.x - 2.5) < 1e-6 and result.stats.pair_tests > 0
     status = lib.prolate_distance(body(0), body(0.5), scratch, c.c_size_t(size), None, c.byref(result))
     assert status == 0 and result.verdict == 1
+    world(lib, tree, scratch, size)
     assert lib.prolate_distance(body(0), body(3), None, c.c_size_t(size), None, c.byref(result)) == 11
     print("distance 2 between", round(result.point_a.x, 3), "...: ctypes agrees")
 

@@ -117,6 +117,70 @@ void query(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scr
     require(s.time_lower <= s.time_upper || s.verdict == PROLATE_SEPARATED);
 }
 
+void query_more(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scratch) {
+    void* const memory = scratch.bytes;
+    const size_t room = sizeof scratch.bytes;
+    auto options = fresh<prolate_query_options>();
+    options.max_tests = in.take<uint16_t>(), options.margin = in.number();
+    prolate_tree scaled;
+    const bool has_scale = prolate_tree_scale(a.tree, in.number(), &scaled, nullptr) == PROLATE_OK;
+    const prolate_body other{has_scale ? &scaled : a.tree, a.pose};
+    auto c = fresh<prolate_collide_result>();
+    require(prolate_collide(other, b, memory, room, &options, nullptr, &c) == PROLATE_OK);
+    require((is_finite(a.pose) && is_finite(b.pose)) || c.verdict != PROLATE_SEPARATED);
+    prolate_meeting_pair pairs[8];
+    auto all = fresh<prolate_collide_all_result>();
+    require(prolate_collide_all(other, b, pairs, in.take<uint8_t>() % 9, memory, room, &options, &all) == PROLATE_OK);
+    const prolate_shape shape{in.take<uint8_t>() % 4, in.vector(), in.vector(), in.vector(),
+                              b.pose.rotation,        in.number()};
+    auto o = fresh<prolate_overlap_result>();
+    require(prolate_overlap(other, &shape, memory, room, &options, &o) == PROLATE_OK);
+    const prolate_motion motion{a.pose, in.vector(), in.vector(), in.vector()};
+    auto step = fresh<prolate_sweep_options>();
+    step.max_tests = 1 + in.take<uint8_t>(), step.tolerance = in.number(), step.margin = in.number();
+    auto s = fresh<prolate_sweep_result>();
+    const prolate_half_space ground{in.vector(), in.number()};
+    require(prolate_half_space_sweep(other.tree, motion, ground, memory, room, &step, &s) == PROLATE_OK);
+    require(s.time_lower <= s.time_upper || s.verdict == PROLATE_SEPARATED);
+
+    prolate_world* world = nullptr;
+    require(prolate_world_create(nullptr, nullptr, &world) == PROLATE_OK);
+    const prolate_part part{b.tree, b.pose};
+    auto body = fresh<prolate_world_body>();
+    prolate_body_id id;
+    body.tree = other.tree, body.pose = a.pose, body.parts = &part, body.part_count = 1;
+    require(prolate_world_insert(world, &body, &id) == PROLATE_OK);
+    body.tree = b.tree, body.pose = b.pose, body.part_count = 0, body.margin = in.number();
+    (void)prolate_world_insert(world, &body, &id);
+    body.tree = nullptr, body.margin = 0, body.half_space = &ground;
+    require(prolate_world_insert(world, &body, &id) == PROLATE_OK);
+    const prolate_body_pair* listed = nullptr;
+    size_t count = 0, events = 0;
+    require(prolate_world_update_pairs(world, nullptr, &listed, &count) == PROLATE_OK);
+    require(count <= 5); // of four entries, of which two are one body
+    const prolate_workers workers{nullptr, memory, room};
+    prolate_verdict verdicts[8];
+    prolate_distance_answer distances[8];
+    const auto records = std::make_unique<prolate_pair_contacts[]>(8);
+    prolate_contact_event event[16];
+    auto limits = fresh<prolate_distance_options>();
+    limits.max_tests = options.max_tests;
+    require(prolate_world_collide(world, listed, count, &workers, &options, verdicts) == PROLATE_OK);
+    require(prolate_world_distance(world, listed, count, &workers, &limits, distances) == PROLATE_OK);
+    require(prolate_world_contacts(world, listed, count, &workers, &options, records.get(), 8) == PROLATE_OK);
+    require(prolate_world_contact_events(world, records.get(), 8, event, 16, &events) == PROLATE_OK);
+    const prolate_ray ray{in.vector(), in.vector(), in.number()};
+    prolate_ray_hit hit;
+    require(prolate_world_raycast(world, &ray, 1, in.take<uint8_t>(), &workers, &options, &hit) == PROLATE_OK);
+    prolate_body_id ids[2];
+    prolate_shape probe = shape;
+    probe.kind %= 3;
+    size_t found = 0;
+    require(prolate_world_overlap(world, &probe, UINT32_MAX, &workers, &options, ids, 2, &found) == PROLATE_OK);
+    require(prolate_world_sweep(world, b.tree, motion, UINT32_MAX, &workers, &step, &id, &s) == PROLATE_OK);
+    prolate_world_destroy(world);
+}
+
 } // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
@@ -132,6 +196,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const bool sound = prolate_tree_open(rest.data(), rest.size(), &opened, nullptr) == PROLATE_OK;
     if (sound) require(prolate_tree_describe(&opened, &info) == PROLATE_OK);
     query(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
+    query_more(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
     const prolate_vec3 half = in.vector();
     prolate_tree other;
     (void)prolate_make_box(half, box.data(), box.size(), nullptr, &other, nullptr);

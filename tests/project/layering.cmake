@@ -43,7 +43,7 @@ set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
-set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|bounds|poses|jobs|world|world_queries")
+set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|bounds|poses|jobs|world|world_queries")
 set(capi_folders "capi")
 set(capi_libraries "prolate/prolate\\.h")
 
