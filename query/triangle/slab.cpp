@@ -1,5 +1,6 @@
 #include "query/triangle/slab.hpp"
 #include "query/ellipsoid/separation.hpp"
+#include "query/triangle/placed.hpp"
 #include "query/triangle/support.hpp"
 #include "src/bytes.hpp"
 #include "src/hull.hpp"
@@ -73,10 +74,11 @@ bool face_each_other(const NodeWithHull& a, const NodeWithHull& b, const Relativ
     const double cosine = glm::dot(n, of_b);
     if (!(std::abs(cosine) > kAboutParallel)) return false;
     const auto corner = [](const NodeWithHull& at) {
-        return to_double(at.tree.vertex(at.tree.triangle(load_le<uint32_t>(at.hull + kHullPlane))[0]));
+        return position(at.tree, at.tree.triangle(load_le<uint32_t>(at.hull + kHullPlane))[0]);
     };
     const auto heights = [](const NodeWithHull& at) {
-        return std::pair(double{load_le<float>(at.hull + kHullLow)}, double{load_le<float>(at.hull + kHullHigh)});
+        const double scale = at.tree.scale();
+        return std::pair(scale * load_le<float>(at.hull + kHullLow), scale * load_le<float>(at.hull + kHullHigh));
     };
     const dvec3 between = b_to_a.rotation * corner(b) + b_to_a.translation - corner(a);
     const double height = glm::dot(n, between);
