@@ -123,6 +123,15 @@ prolate_status prolate_tree_scale(const prolate_tree* tree, float scale, prolate
     return PROLATE_OK;
 }
 
+prolate_status prolate_tree_round(const prolate_tree* tree, float radius, prolate_tree* rounded, prolate_error* error) {
+    const TreeView* const view = view_of(tree);
+    if (view == nullptr || rounded == nullptr) return failed(PROLATE_BAD_ARGUMENT, error);
+    const auto made = view->rounded(radius);
+    if (!made) return failed(made.error(), error);
+    hold(*made, rounded);
+    return PROLATE_OK;
+}
+
 prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info* info) {
     const TreeView* const view = view_of(tree);
     if (view == nullptr || info == nullptr) return PROLATE_BAD_ARGUMENT;
@@ -162,6 +171,14 @@ prolate_status prolate_make_cylinder(float radius, float half_height, void* buff
                                      prolate_tree* tree, prolate_error* error) {
     if ((buffer == nullptr && capacity > 0) || tree == nullptr) return failed(PROLATE_BAD_ARGUMENT, error);
     return hand_over(cylinder_tree(radius, half_height), buffer, capacity, needed, tree, error);
+}
+
+prolate_status prolate_make_capsule(prolate_vec3 a, prolate_vec3 b, float radius, void* buffer, size_t capacity,
+                                    size_t* needed, prolate_tree* tree, prolate_error* error) {
+    if ((buffer == nullptr && capacity > 0) || tree == nullptr) return failed(PROLATE_BAD_ARGUMENT, error);
+    const prolate_status made =
+        hand_over(capsule_tree(same<Vec3>(a), same<Vec3>(b), radius), buffer, capacity, needed, tree, error);
+    return made == PROLATE_OK ? prolate_tree_round(tree, radius, tree, error) : made;
 }
 
 prolate_status prolate_make_convex(const prolate_vec3* points, size_t point_count, const uint32_t* triangles,

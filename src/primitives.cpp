@@ -36,9 +36,10 @@ public:
     PolyhedronTree(std::vector<Vec3> vertices, std::vector<Triangle> triangles)
         : vertices_(std::move(vertices)), triangles_(std::move(triangles)) {}
 
-    Result<Tree> make() {
+    /// `closed`: it bounds a solid. `size`: its nodes need be no smaller than a small part of that.
+    Result<Tree> make(bool closed = true, double size = 0) {
         const Box box = box_of({0, static_cast<uint32_t>(triangles_.size())});
-        lattice_ = format::lattice_for(box.low.data(), box.high.data());
+        lattice_ = format::lattice_for(box.low.data(), box.high.data(), size);
         std::vector<PackedLevel> levels;
         std::vector<Part> parts{{0, static_cast<uint32_t>(triangles_.size())}};
         std::vector<Triangle> sorted;
@@ -59,7 +60,7 @@ public:
             parts = std::move(next);
         }
         BakeInfo info;
-        info.exact = true;
+        info.exact = true, info.surface_mode = !closed;
         auto tree = Tree::open(format::encode(info, kDegree, lattice_, levels, {vertices_, sorted, 1}));
         return tree ? std::move(tree) : Result<Tree>(bad_size());
     }
@@ -142,12 +143,12 @@ private:
     format::Lattice lattice_;
 };
 
-Result<Tree> tree_of(std::vector<Vec3> vertices, std::vector<Triangle> triangles) {
+Result<Tree> tree_of(std::vector<Vec3> vertices, std::vector<Triangle> triangles, bool closed = true, double size = 0) {
     try {
         for (const Vec3& v : vertices)
             for (const float x : {v.x, v.y, v.z})
                 if (!(std::abs(x) <= kLargestCoordinate)) return bad_size();
-        return PolyhedronTree(std::move(vertices), std::move(triangles)).make();
+        return PolyhedronTree(std::move(vertices), std::move(triangles)).make(closed, size);
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, "there is not enough memory"};
     }
@@ -323,6 +324,12 @@ Result<Tree> ellipsoid_tree(const Ellipsoid& e) {
     } catch (const std::bad_alloc&) {
         return Error{ErrorCode::out_of_memory, "there is not enough memory"};
     }
+}
+
+Result<Tree> capsule_tree(const Vec3& a, const Vec3& b, float radius) {
+    if (!is_length(radius)) return bad_size();
+    auto segment = tree_of({a, b}, {{0, 1, 1}}, false, radius); // a triangle without area
+    return segment ? std::move(*segment).rounded(radius) : std::move(segment);
 }
 
 Result<Tree> sphere_tree(float radius) {

@@ -44,6 +44,20 @@ Result<TreeView> TreeView::scaled(float scale) const noexcept {
     return out;
 }
 
+Result<TreeView> TreeView::rounded(float radius) const noexcept {
+    if (!(radius >= 0 && radius <= kLargestCoordinate))
+        return Error{ErrorCode::bad_options, "a radius must be finite and not negative", 0};
+    TreeView out = *this;
+    out.radius_ = radius;
+    return out;
+}
+
+Result<Tree> Tree::rounded(float radius) && {
+    const auto view = view_.rounded(radius);
+    if (!view) return view.error();
+    return Tree(std::move(bytes_), *view);
+}
+
 uint32_t TreeView::degree() const noexcept {
     return load_le<uint16_t>(bytes_.data() + kAtDegree);
 }

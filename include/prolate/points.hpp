@@ -46,6 +46,8 @@ struct SignedDistance {
 /// overlaps itself or not. An exact tree of an open mesh has no inside: distances are those from its triangles, above
 /// 0. Of a prefix of an exact tree, which has no triangles, only `lower` is certified, of the distance from outside.
 ///
+/// Of a rounded body (TreeView::rounded()), how deep a point inside lies is not known: `lower` is then -infinity.
+///
 /// Anytime: a small budget only widens the bounds. A pose or point that is not finite, or a quaternion of zero, leaves
 /// everything open. Thread-safe on shared trees. The search is described in query/points/search.cpp.
 SignedDistance signed_distance(const TreeView& tree, const Pose& pose, const Vec3& point, Scratch context,

@@ -1,6 +1,7 @@
-// Trees of simple solids, made on the spot: a box, a cylinder, a convex polyhedron, an ellipsoid. They need no mesh
-// file and no bake, and are bodies like all others: every query and every World takes them, with the same certificates,
-// manifolds, ids and caches. A floor is a large box. shapes.hpp asks for overlaps with shapes that are no bodies.
+// Trees of simple solids, made on the spot: a box, a cylinder, a convex polyhedron, an ellipsoid, a capsule. They need
+// no mesh file and no bake, and are bodies like all others: every query and every World takes them, with the same
+// certificates, manifolds, ids and caches. A floor is a large box. shapes.hpp asks for overlaps with shapes that are no
+// bodies.
 //
 // Making one takes some microseconds and allocates its bytes; queries allocate nothing. All functions are thread-safe,
 // and give the same bits on all machines. The trees say nothing of their mass (BakeInfo::mass is 0).
@@ -34,5 +35,10 @@ Result<Tree> convex_tree(std::span<const Vec3> points, std::span<const Triangle>
 Result<Tree> ellipsoid_tree(const Ellipsoid& e);
 /// The same for the ball around the origin.
 Result<Tree> sphere_tree(float radius);
+
+/// The capsule of all points within `radius` of the segment from `a` to `b`, exactly but for 1e-7 of the radius: a tree
+/// of the segment, whose view is rounded() by the radius. Where `a` and `b` are the same, a ball. Fails as box_tree()
+/// does. Of a save()d file, the view must be rounded again.
+Result<Tree> capsule_tree(const Vec3& a, const Vec3& b, float radius);
 
 } // namespace prolate

@@ -132,6 +132,10 @@ PROLATE_API prolate_status prolate_tree_describe(const prolate_tree* tree, prola
 PROLATE_API prolate_status prolate_tree_scale(const prolate_tree* tree, float scale, prolate_tree* scaled,
                                               prolate_error* error);
 
+/** tree.hpp: TreeView::rounded(). `rounded` may be `tree`. */
+PROLATE_API prolate_status prolate_tree_round(const prolate_tree* tree, float radius, prolate_tree* rounded,
+                                              prolate_error* error);
+
 /** primitives.hpp. Their bytes go into `buffer` as with prolate_tree_load(); prolate_primitive_size() is enough but for
  * large polyhedra. `triangles`: three indices each. */
 PROLATE_API size_t prolate_primitive_size(void);
@@ -141,6 +145,10 @@ PROLATE_API prolate_status prolate_make_sphere(float radius, void* buffer, size_
                                                prolate_tree* tree, prolate_error* error);
 PROLATE_API prolate_status prolate_make_cylinder(float radius, float half_height, void* buffer, size_t capacity,
                                                  size_t* needed, prolate_tree* tree, prolate_error* error);
+/** capsule_tree(): `tree` is rounded by the radius, which `buffer` does not hold. */
+PROLATE_API prolate_status prolate_make_capsule(prolate_vec3 a, prolate_vec3 b, float radius, void* buffer,
+                                                size_t capacity, size_t* needed, prolate_tree* tree,
+                                                prolate_error* error);
 PROLATE_API prolate_status prolate_make_convex(const prolate_vec3* points, size_t point_count,
                                                const uint32_t* triangles, size_t triangle_count, void* buffer,
                                                size_t capacity, size_t* needed, prolate_tree* tree,

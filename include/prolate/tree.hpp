@@ -87,6 +87,13 @@ public:
     /// What queries multiply all lengths by; 1 unless it comes from scaled(). All numbers below are as stored.
     float scale() const noexcept { return raw_.lattice().scale; }
 
+    /// The same tree, but a body for queries is all that lies within `radius`, metres, of it (after scaled()): capsules
+    /// of segments, balls of points (primitives.hpp), boxes with round edges. As certified as without, and exact but
+    /// for the rounding of floats, 1e-7 of the radius. Fails with bad_options if it is not finite, or negative.
+    Result<TreeView> rounded(float radius) const noexcept;
+    /// What it was rounded by; 0 unless it comes from rounded().
+    float radius() const noexcept { return radius_; }
+
     uint32_t node_count() const noexcept { return node_count_; }
     uint32_t block_count() const noexcept { return block_count_; }
     /// All slots are below this: kBlockLanes * block_count(). The root's slot is 0.
@@ -179,6 +186,7 @@ private:
     uint32_t vertex_count_ = 0;
     uint32_t triangle_count_ = 0;
     uint32_t component_count_ = 0;
+    float radius_ = 0;
 };
 
 /// A tree that owns its bytes. Can be moved, but not copied.
@@ -190,6 +198,9 @@ public:
     Tree& operator=(Tree&&) = default;
     Tree(const Tree&) = delete;
     Tree& operator=(const Tree&) = delete;
+
+    /// The same bytes, of which view() is rounded() by `radius`. The bytes know nothing of it.
+    Result<Tree> rounded(float radius) &&;
 
     TreeView view() const noexcept { return view_; }
     std::span<const std::byte> bytes() const noexcept { return bytes_; }

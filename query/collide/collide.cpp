@@ -83,7 +83,9 @@ CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeVi
                              std::span<MeetingPair> pairs, Scratch context, const QueryOptions& options) noexcept {
     if (!query::suffices(context, a, b)) return {};
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
-    query::CollideSearch search(bodies, context, options);
+    QueryOptions of_cores = options;
+    of_cores.margin = query::with_radius(query::sound(options).margin, double{a.radius()} + b.radius());
+    query::CollideSearch search(bodies, context, of_cores);
     search.all = true;
     search.pairs = pairs;
     const Verdict verdict = query::decide(search);
@@ -99,7 +101,8 @@ CollideAllResult collide_all(const TreeView& a, const Pose& pose_a, const TreeVi
 CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
                       const QueryOptions& query_options, PairCache* cache) noexcept {
     if (!query::suffices(context, a, b)) return {};
-    const QueryOptions options = query::sound(query_options);
+    QueryOptions options = query::sound(query_options);
+    options.margin = query::with_radius(options.margin, double{a.radius()} + b.radius());
     if (!usable(cache, a, b, options)) cache = nullptr;
     const auto remember = [&](Verdict verdict, const MeetingPair& pair, double distance) {
         *cache = {.verdict = verdict,

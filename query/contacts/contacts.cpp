@@ -325,7 +325,12 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
 
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, Scratch context, const QueryOptions& options) noexcept {
-    return query::contacts(a, pose_a, b, pose_b, manifolds, context, options, query::kMany);
+    const double radii = double{a.radius()} + b.radius();
+    QueryOptions of_cores = options;
+    of_cores.margin = query::with_radius(query::sound(options).margin, radii);
+    const ContactResult out = query::contacts(a, pose_a, b, pose_b, manifolds, context, of_cores, query::kMany);
+    if (radii > 0) query::round_contacts(manifolds, a.radius(), b.radius());
+    return out;
 }
 
 } // namespace prolate

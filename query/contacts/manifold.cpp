@@ -138,4 +138,16 @@ Manifold manifold_of(const Patch& patch, double same_point, bool exchanged, cons
     return out;
 }
 
+void round_contacts(ContactManifolds& manifolds, float radius_a, float radius_b) noexcept {
+    const auto move = [](Vec3& p, const Vec3& n, float by) { p = {p.x + by * n.x, p.y + by * n.y, p.z + by * n.z}; };
+    for (uint32_t i = 0; i < manifolds.count; ++i) {
+        Manifold& m = manifolds.manifolds[i];
+        for (uint32_t k = 0; k < m.count; ++k) {
+            ContactPoint& p = m.points[k];
+            move(p.point_a, m.normal, radius_a), move(p.point_b, m.normal, -radius_b);
+            p.depth += radius_a + radius_b;
+        }
+    }
+}
+
 } // namespace prolate::query

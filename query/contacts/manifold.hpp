@@ -101,6 +101,9 @@ private:
 /// A's frame.
 Manifold manifold_of(const Patch& patch, double same_point, bool exchanged, const RelativePose& to_world) noexcept;
 
+/// What contacts of cores are, of bodies that are these and all within a radius of them.
+void round_contacts(ContactManifolds& manifolds, float radius_a, float radius_b) noexcept;
+
 /// Sorts points into patches by their normals: the deepest of them, if there are more.
 class Patches {
 public:

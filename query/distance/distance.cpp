@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace prolate {
 namespace {
@@ -36,9 +37,10 @@ DistanceResult run(query::DistanceSearch& search, const Pose& pose_a, const Meet
 
 } // namespace
 
-DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
-                        const DistanceOptions& options, DistanceCache* cache) noexcept {
-    if (!query::suffices(context, a, b)) return {};
+namespace {
+
+DistanceResult of_cores(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                        const DistanceOptions& options, DistanceCache* cache) {
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
     MeetingPair first;
     const bool has_first = cache != nullptr && cache->valid;
@@ -49,6 +51,56 @@ DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b
     if (cache != nullptr && out.upper < query::DistanceSearch::kInfinity && !out.enclosed)
         *cache = {.valid = true, .pair = out.pair};
     return out;
+}
+
+// Of bodies that are all within a radius of their cores: what is known of these, less both radii. Where that says
+// nothing, collide() knows whether they meet.
+DistanceResult of_rounded(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                          const DistanceOptions& options, DistanceCache* cache) {
+    const double radii = double{a.radius()} + b.radius();
+    DistanceOptions limits = options;
+    limits.max_distance = query::sound_length(options.max_distance) + radii;
+    DistanceCache last;
+    if (cache == nullptr) cache = &last;
+    DistanceResult out = of_cores(a, pose_a, b, pose_b, context, limits, cache);
+    // A share of what is left, not of the distance of the cores.
+    const double wanted = std::max(query::sound_tolerance(options.tolerance_absolute),
+                                   query::sound_tolerance(options.tolerance_relative) * (out.upper - radii));
+    if (out.upper > radii && out.upper - out.lower > wanted && out.lower < limits.max_distance) {
+        limits.tolerance_absolute = wanted, limits.tolerance_relative = 0;
+        limits.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests());
+        const QueryStats before = out.stats;
+        const DistanceResult closer = of_cores(a, pose_a, b, pose_b, context, limits, cache);
+        if (closer.lower >= out.lower && closer.upper <= out.upper) out = closer;
+        query::add(before, out.stats);
+    }
+    if (out.verdict == Verdict::overlapping) return out;
+    if (out.lower <= radii * (1 + 0x1p-20)) {
+        const CollideResult met =
+            collide(a, pose_a, b, pose_b, context,
+                    {.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests())});
+        query::add(met.stats, out.stats);
+        out.verdict = met.verdict;
+    }
+    out.lower = std::max(0.0, out.lower * (1 - 0x1p-51) - radii);
+    out.upper = std::max(0.0, out.upper * (1 + 0x1p-51) - radii);
+    if (out.verdict == Verdict::overlapping) out.lower = 0;
+    if (out.verdict == Verdict::separated) out.lower = std::max(out.lower, std::numeric_limits<double>::min());
+    if (out.verdict == Verdict::separated) out.upper = std::max(out.upper, out.lower);
+    const auto moved = [&](const Vec3& p, float by) {
+        return Vec3{p.x + by * out.normal.x, p.y + by * out.normal.y, p.z + by * out.normal.z};
+    };
+    out.point_a = moved(out.point_a, a.radius()), out.point_b = moved(out.point_b, -b.radius());
+    return out;
+}
+
+} // namespace
+
+DistanceResult distance(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
+                        const DistanceOptions& options, DistanceCache* cache) noexcept {
+    if (!query::suffices(context, a, b)) return {};
+    const bool rounded = a.radius() > 0 || b.radius() > 0;
+    return (rounded ? of_rounded : of_cores)(a, pose_a, b, pose_b, context, options, cache);
 }
 
 } // namespace prolate

@@ -19,6 +19,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace prolate {
 namespace query {
@@ -114,10 +115,11 @@ private:
 } // namespace
 } // namespace query
 
-DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
-                        const DistanceOptions& options) noexcept {
+namespace {
+
+DistanceResult of_core(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
+                       const DistanceOptions& options) {
     DistanceResult out;
-    if (!query::suffices(context, tree)) return out;
     const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
     if (!query::is_finite(shape)) return out;
     query::HeightSearch search(tree, shape, context, {.max_pair_tests = options.max_pair_tests});
@@ -145,9 +147,39 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
     return out;
 }
 
+} // namespace
+
+DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
+                        const DistanceOptions& options) noexcept {
+    if (!query::suffices(context, tree)) return {};
+    const double radius = tree.radius();
+    if (!(radius > 0)) return of_core(tree, pose, half_space, context, options);
+    DistanceOptions limits = options;
+    limits.max_distance = query::sound_length(options.max_distance) + radius;
+    DistanceResult out = of_core(tree, pose, half_space, context, limits);
+    if (out.verdict == Verdict::overlapping) return out;
+    if (out.lower <= radius * (1 + 0x1p-20)) {
+        const OverlapResult met =
+            overlap(tree, pose, half_space, context,
+                    {.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests())});
+        query::add(met.stats, out.stats);
+        out.verdict = met.verdict;
+    }
+    out.lower = std::max(0.0, out.lower * (1 - 0x1p-51) - radius);
+    out.upper = std::max(0.0, out.upper * (1 + 0x1p-51) - radius);
+    if (out.verdict == Verdict::overlapping) out.lower = 0;
+    if (out.verdict == Verdict::separated) out.lower = std::max(out.lower, std::numeric_limits<double>::min());
+    if (out.verdict == Verdict::separated) out.upper = std::max(out.upper, out.lower);
+    const auto by = static_cast<float>(radius);
+    out.point_a = {out.point_a.x + by * out.normal.x, out.point_a.y + by * out.normal.y,
+                   out.point_a.z + by * out.normal.z};
+    return out;
+}
+
 ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
                        Scratch context, const QueryOptions& query_options) noexcept {
-    const QueryOptions options = query::sound(query_options);
+    QueryOptions options = query::sound(query_options);
+    options.margin = query::with_radius(options.margin, tree.radius());
     const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
     const query::RelativePose to_world = query::relative_pose(Pose{}, pose);
     const query::LastContacts last(manifolds, false, to_world);
@@ -174,6 +206,7 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
     manifolds.count = 1;
     manifolds.manifolds[0] = query::manifold_of(touching.patch, touching.same_point, false, to_world);
     last.hand_on(manifolds.manifolds[0]);
+    if (tree.radius() > 0) query::round_contacts(manifolds, tree.radius(), 0);
     return out;
 }
 

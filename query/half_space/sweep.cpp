@@ -29,7 +29,6 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kTolerance = 1e-4; // of the body, if none is given
 constexpr double kLeastTolerance = 0x1p-38;
 constexpr double kRoundDown = 1 - 0x1p-40; // of times: far above what rounds in them
 
@@ -54,8 +53,9 @@ public:
         const PlacedEllipsoid bound = place(tree.bound(0), tree.scale());
         const MovingBody& body = motion_.a();
         reach_ = bound.reach + ground_.reach + motion_.at(1).b_to_a.distance;
-        const double asked =
-            options_.tolerance > 0 ? options_.tolerance : kTolerance * place(tree.root(), tree.scale()).size;
+        const double asked = options_.tolerance > 0
+                                 ? options_.tolerance
+                                 : kSweepTolerance * (place(tree.root(), tree.scale()).size + tree.radius());
         const double tolerance = std::max(asked, kLeastTolerance * (1 + body.speed()) * reach_);
         target_ = options_.margin + tolerance / 2, reached_ = options_.margin + tolerance;
         const double lever = glm::distance(bound.center, body.center()) + bound.size;
@@ -141,7 +141,11 @@ private:
 SweepResult sweep(const TreeView& tree, const Motion& motion, const HalfSpace& half_space, Scratch context,
                   const SweepOptions& options) noexcept {
     if (!query::suffices(context, tree)) return {};
-    return query::Fall(tree, motion, half_space, context, options).run();
+    SweepOptions of_core = options;
+    of_core.margin = query::with_radius(query::sound_length(options.margin), tree.radius());
+    SweepResult out = query::Fall(tree, motion, half_space, context, of_core).run();
+    if (tree.radius() > 0) query::round_sweep(out, tree.radius(), 0);
+    return out;
 }
 
 } // namespace prolate

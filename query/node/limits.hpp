@@ -4,6 +4,7 @@
 #include <prolate/query.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -21,6 +22,18 @@ inline double sound_tolerance(double x) noexcept {
 inline QueryOptions sound(QueryOptions options) noexcept {
     options.margin = sound_length(options.margin);
     return options;
+}
+
+/// A margin of cores, for one of the bodies that are these cores and all within a radius of them: rounded up.
+inline float with_radius(float margin, double radius) noexcept {
+    if (!(radius > 0)) return margin;
+    return std::nextafter(static_cast<float>(double{margin} + radius), std::numeric_limits<float>::infinity());
+}
+
+/// Adds what another part of a query did.
+inline void add(const QueryStats& from, QueryStats& to) noexcept {
+    to.pair_tests += from.pair_tests, to.block_tests += from.block_tests, to.triangle_tests += from.triangle_tests;
+    to.deepest_level = std::max(to.deepest_level, from.deepest_level);
 }
 
 /// Tests left of a budget.

@@ -29,11 +29,16 @@ class PointBatch {
 public:
     PointBatch(const TreeView& tree, const Pose& pose, Scratch context, const PointOptions& options)
         : tree_(tree), to_tree_(relative_pose(pose, Pose{})), to_world_(relative_pose(Pose{}, pose)), context_(context),
-          max_tests_(options.max_pair_tests), max_distance_(sound_length(options.max_distance)),
-          ellipsoids_(!tree.has_triangles() && !tree.bake_info().exact), surface_mode_(tree.surface_mode()),
-          has_room_(suffices(context, tree)), reach_(place(tree.bound(0), tree.scale()).reach) {}
+          max_tests_(options.max_pair_tests), max_distance_(sound_length(options.max_distance) + tree.radius()),
+          radius_(tree.radius()), ellipsoids_(!tree.has_triangles() && !tree.bake_info().exact),
+          surface_mode_(tree.surface_mode()), has_room_(suffices(context, tree)),
+          reach_(place(tree.bound(0), tree.scale()).reach) {}
 
     SignedDistance signed_distance(const Vec3& p) {
+        SignedDistance out = of_core(p);
+        return radius_ > 0 ? of_rounded(out) : out;
+    }
+    SignedDistance of_core(const Vec3& p) {
         const PlacedPoint point = place(p, to_tree_);
         SignedDistance out;
         if (!std::isfinite(point.reach) || !has_room_) return out;
@@ -47,6 +52,7 @@ public:
 
     // Only whether the point is outside: what is not nearer than rounding need not be looked at.
     Verdict contains(const Vec3& p) {
+        if (radius_ > 0) return signed_distance(p).verdict;
         const PlacedPoint point = place(p, to_tree_);
         if (!std::isfinite(point.reach) || !has_room_) return Verdict::undecided;
         SignedDistance out;
@@ -59,6 +65,25 @@ public:
     }
 
 private:
+    // Of all within the radius: outside, the distance less that. Inside, its surface is at least as far as that, and
+    // how far is not known.
+    SignedDistance of_rounded(SignedDistance out) const {
+        const bool outside = out.lower > radius_;
+        if (outside)
+            out.verdict = Verdict::separated;
+        else if (out.upper <= radius_ || out.verdict == Verdict::overlapping ||
+                 out.upper - out.lower <= 4 * kSeparationMargin * (reach_ + radius_))
+            out.verdict = Verdict::overlapping;
+        else
+            out.verdict = Verdict::undecided;
+        out.lower = outside ? out.lower * (1 - 0x1p-51) - radius_ : -NearestSearch::kInfinity;
+        out.upper = out.upper - radius_ + 0x1p-51 * (std::abs(out.upper) + radius_);
+        const auto by = static_cast<float>(radius_);
+        out.point = {out.point.x + by * out.gradient.x, out.point.y + by * out.gradient.y,
+                     out.point.z + by * out.gradient.z};
+        return out;
+    }
+
     // The last point: a surface is no nearer to it than `lower`.
     struct Known {
         Side side = Side::unknown;
@@ -162,7 +187,7 @@ private:
     const RelativePose to_tree_, to_world_;
     Scratch context_;
     const uint64_t max_tests_;
-    const double max_distance_;
+    const double max_distance_, radius_;
     const bool ellipsoids_, surface_mode_, has_room_;
     const double reach_; // of the body
     Known known_;

@@ -40,7 +40,8 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Scrat
     using glm::dvec3;
     if (!query::suffices(context, tree)) return {};
     QueryOptions options = query::sound(query_options);
-    options.margin = std::min(options.margin, std::numeric_limits<float>::max()); // an infinite one would make NaNs
+    options.margin = std::min(query::with_radius(options.margin, tree.radius()),
+                              std::numeric_limits<float>::max()); // an infinite one would make NaNs
     RaycastResult out;
     const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
     query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.bound(0), tree.scale());

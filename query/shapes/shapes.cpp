@@ -53,7 +53,8 @@ template <class Shape>
 OverlapResult overlap_placed(const TreeView& tree, const Pose& pose, const Shape& shape, Scratch context,
                              const QueryOptions& query_options) {
     if (!suffices(context, tree)) return {};
-    const QueryOptions options = sound(query_options);
+    QueryOptions options = sound(query_options);
+    options.margin = with_radius(options.margin, tree.radius());
     return overlap_with(tree, place(shape, pose, options.margin), context, options);
 }
 

@@ -27,7 +27,6 @@ namespace {
 using glm::dmat3;
 using glm::dvec3;
 
-constexpr double kTolerance = 1e-4; // of the smaller body, if none is given
 // The least tolerance. A step that begins while upper > reached gains if the gap along n exceeds the target by more
 // than its own rounding: the gap is `lower`, reached - target half of the tolerance, so it does if that is above upper
 // - lower and the rounding. With S all lengths that enter, pieces whose edges are nearly parallel (slivers, and boxes
@@ -137,7 +136,7 @@ SweepSearch::SweepSearch(const OrderedBodies<Motion>& bodies, Scratch context,
     move_to(0);
     const PlacedEllipsoid x = place(a.tree.root(), a.tree.scale()),
                           y = place(b.tree.root(), b.tree.scale(), now.b_to_a);
-    const double asked = options.tolerance > 0 ? options.tolerance : kTolerance * std::min(x.size, y.size);
+    const double asked = options.tolerance > 0 ? options.tolerance : kSweepTolerance * std::min(x.size, y.size);
     const double turned = motion.a().speed() + motion.b().speed();
     const double tolerance = std::max({asked, kLeastOfSizes * (x.size + y.size),
                                        std::max(kLeastOfLengths, kLeastOfTurns * (1 + turned)) * (x.reach + y.reach)});

@@ -31,6 +31,19 @@ struct SineCosine {
 /// |x| <= kMaxTurn.
 SineCosine sine_cosine(double x) noexcept;
 
+/// Of the smaller body's size: the tolerance if none is given.
+inline constexpr double kSweepTolerance = 1e-4;
+
+/// What a meeting of cores is, of bodies that are these and all within a radius of them.
+inline void round_sweep(SweepResult& r, float radius_a, float radius_b) noexcept {
+    if (r.enclosed || !(r.time_upper <= 1)) return;
+    const auto move = [&](Vec3& p, float by) {
+        p = {p.x + by * r.normal.x, p.y + by * r.normal.y, p.z + by * r.normal.z};
+    };
+    move(r.point_a, radius_a), move(r.point_b, -radius_b);
+    r.distance = r.distance > double{radius_a} + radius_b ? r.distance - (double{radius_a} + radius_b) : 0;
+}
+
 /// The motion of one body, in double precision.
 class MovingBody {
 public:

@@ -36,10 +36,20 @@ SweepResult run(query::SweepSearch& search, const Motion& motion_a) {
 SweepResult sweep(const TreeView& a, const Motion& motion_a, const TreeView& b, const Motion& motion_b, Scratch context,
                   const SweepOptions& options) noexcept {
     if (!query::suffices(context, a, b)) return {};
+    const double radii = double{a.radius()} + b.radius();
+    SweepOptions of_cores = options;
+    if (radii > 0) { // the core of a ball has no size
+        of_cores.margin = query::with_radius(query::sound_length(options.margin), radii);
+        const auto size = [](const TreeView& tree) {
+            return query::place(tree.root(), tree.scale()).size + tree.radius();
+        };
+        if (!(options.tolerance > 0)) of_cores.tolerance = query::kSweepTolerance * std::min(size(a), size(b));
+    }
     const auto bodies = query::in_canonical_order(a, motion_a, b, motion_b);
-    query::SweepSearch search(bodies, context, options);
+    query::SweepSearch search(bodies, context, of_cores);
     SweepResult out = run(search, bodies.place_a);
     if (bodies.exchanged) query::exchange_bodies(out);
+    if (radii > 0) query::round_sweep(out, a.radius(), b.radius());
     return out;
 }
 

@@ -35,7 +35,7 @@ Bounds bounds_at(const TreeView& tree, const RelativePose& to_world, float margi
     if (!std::isfinite(to_world.distance)) return kEverything;
     const auto [to] = reach(tree, to_world, tolerance, rounding);
     const dvec3& t = to_world.translation;
-    const double pad = margin + rounding * (to_world.distance + margin);
+    const double wider = double{margin} + tree.radius(), pad = wider + rounding * (to_world.distance + wider);
     return {{round_down(t.x - to[3] - pad), round_down(t.y - to[4] - pad), round_down(t.z - to[5] - pad)},
             {round_up(t.x + to[0] + pad), round_up(t.y + to[1] + pad), round_up(t.z + to[2] + pad)}};
 }

@@ -26,11 +26,6 @@ Result<void> check(size_t questions, size_t room, const Workers& workers) {
     return {};
 }
 
-void add(const QueryStats& from, QueryStats& to) {
-    to.pair_tests += from.pair_tests, to.block_tests += from.block_tests, to.triangle_tests += from.triangle_tests;
-    to.deepest_level = std::max(to.deepest_level, from.deepest_level);
-}
-
 // The float above: whatever is hit at t is hit before it.
 float above(double t) {
     return std::nextafter(static_cast<float>(t), std::numeric_limits<float>::infinity());
@@ -51,7 +46,7 @@ RayHit first_hit(const World& world, const Ray& ray, Scratch context, const Quer
         [&](BodyId id, float until) {
             const RaycastResult r =
                 query::raycast(*world.find(id), {ray.origin, ray.direction, until}, context, options);
-            add(r.stats, stats);
+            query::add(r.stats, stats);
             if (r.verdict == Verdict::undecided) undecided = true;
             if (r.verdict != Verdict::separated) clear = std::min(clear, r.clear);
             const bool first =
@@ -87,10 +82,10 @@ Bounds about_center(const MovingTree& moving, const SweepOptions& options) {
     const query::PlacedEllipsoid root = query::place(moving.tree.root_bound(), moving.tree.scale());
     const dvec3 pivot = query::to_double(moving.motion.center), center = at.rotation * pivot + at.translation;
     // Within the tolerance two bodies may be said to meet: by default, 1e-4 of the smaller one's size.
-    const double tolerance = query::sound_tolerance(options.tolerance) + 1e-4 * root.size;
-    const double lengths = root.reach + glm::length(pivot) + at.distance;
-    const double radius = glm::distance(root.center, pivot) + root.size + query::sound_length(double{options.margin}) +
-                          tolerance + query::kSeparationMargin * lengths;
+    const double tolerance = query::sound_tolerance(options.tolerance) + 1e-4 * (root.size + moving.tree.radius());
+    const double lengths = root.reach + glm::length(pivot) + at.distance + moving.tree.radius();
+    const double radius = glm::distance(root.center, pivot) + root.size + moving.tree.radius() +
+                          query::sound_length(double{options.margin}) + tolerance + query::kSeparationMargin * lengths;
     return {
         {query::round_down(center.x - radius), query::round_down(center.y - radius),
          query::round_down(center.z - radius)},
@@ -111,7 +106,7 @@ SweepHit first_hit(const World& world, const MovingTree& moving, Scratch context
             Motion rest;
             rest.start = other.pose;
             const SweepResult r = query::sweep(body, moving.motion, other, rest, context, options);
-            add(r.stats, stats);
+            query::add(r.stats, stats);
             lower = std::min(lower, r.time_lower), undecided = undecided || r.verdict == Verdict::undecided;
             const bool first = out.body == BodyId{} || r.time_upper < out.result.time_upper ||
                                (r.time_upper == out.result.time_upper && id.index < out.body.index);

@@ -197,6 +197,21 @@ static void test_scaled_and_shapes(void) {
     CHECK_OK(prolate_distance(at(&twice, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
     CHECK(d.lower <= 1.5 && d.upper >= 1.5 && d.upper - d.lower < 1e-5);
 
+    /* A capsule is a rounded segment; a box may have round edges. */
+    unsigned char segment_bytes[16384];
+    prolate_tree capsule, round_box;
+    CHECK_OK(prolate_make_capsule((prolate_vec3){0, 0, -1}, (prolate_vec3){0, 0, 1}, 0.25f, segment_bytes,
+                                  sizeof segment_bytes, NULL, &capsule, &error));
+    CHECK_OK(prolate_distance(at(&capsule, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
+    CHECK(d.lower <= 2.25 && d.upper >= 2.25 && d.upper - d.lower < 1e-5);
+    CHECK_OK(prolate_tree_round(&box, 0.5f, &round_box, &error));
+    CHECK_OK(prolate_distance(at(&round_box, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
+    CHECK(d.lower <= 1.5 && d.upper >= 1.5);
+    CHECK_STATUS(prolate_tree_round(&box, -1, &round_box, &error), PROLATE_BAD_OPTIONS);
+    CHECK_STATUS(prolate_make_capsule((prolate_vec3){0, 0, 0}, (prolate_vec3){0, 0, 1}, 0, segment_bytes,
+                                      sizeof segment_bytes, NULL, &capsule, &error),
+                 PROLATE_BAD_OPTIONS);
+
     /* Scratch of the least size, at any address; and less. */
     const size_t least = prolate_scratch_size_of(&box, &ball);
     CHECK(least < 8192 && prolate_scratch_size_of(NULL, NULL) == prolate_scratch_size());
