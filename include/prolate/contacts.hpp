@@ -86,9 +86,9 @@ struct ContactResult {
 /// Bodies that overlap by more than about half their size may be separated through another side than the nearest;
 /// sweep() keeps it from coming to that.
 ///
-/// Of rounded bodies (TreeView::rounded()), the contacts are those of the cores, as far apart as the radii and the margin
-/// allow, moved onto the round surfaces along the normals: exact where cores do not meet, but for what the mean of a
-/// manifold's normals does to points that are not its deepest.
+/// Of rounded bodies (TreeView::rounded()), the contacts are those of the cores, as far apart as the radii and the
+/// margin allow, moved onto the round surfaces along the normals: exact where cores do not meet, but for what the mean
+/// of a manifold's normals does to points that are not its deepest.
 ///
 /// The search runs twice, first to find the normals, then to collect the points. The answer's counters, and
 /// options.max_pair_tests, count one run. query/contacts/contacts.cpp has the details, query/triangle/contact.hpp the
