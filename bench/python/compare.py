@@ -5,8 +5,9 @@
 For each pair of meshes, poses are drawn so that the surfaces are *far*, *near* (apart by less than a tenth of the
 diagonal) or *touching*. Each package is asked pose by pose, from Python, with its objects made beforehand. Its time is
 the median over the poses of the least of several turns, and the turns go round the packages. One that takes more than
-50 ms is asked at three poses only. "batch" is prolate asked for 2,000 poses by one call. Ratios are to prolate's
-single call. Verdicts and distances are compared with coal.distance, which is exact for meshes; poses nearer than 1e-6
+50 ms is asked at three poses only. "single, C++" is the call that prolate's single call makes, without Python; "batch"
+is prolate asked for 2,000 poses by one call. Ratios are to prolate's single call. "import" is how much longer a fresh
+Python takes to import a package, numpy included where it brings that, median of 11. Verdicts and distances are compared with coal.distance, which is exact for meshes; poses nearer than 1e-6
 of the diagonal are not judged.
 
 Meshes are surfaces to Coal and FCL, so poses with one body inside the other are left out.
@@ -17,6 +18,7 @@ from __future__ import annotations
 import argparse
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -309,7 +311,8 @@ def batch_times(pair, poses, options):
                 done = subprocess.run(
                     [options.native, *paths, str(options.seconds / 5)], capture_output=True, check=True
                 )
-                least["batch, C++"] = min(least.get("batch, C++", float("inf")), float(done.stdout))
+                for name, took in zip(("batch, C++", "single, C++"), map(float, done.stdout.split())):
+                    least[name] = min(least.get(name, float("inf")), took)
             for name, form in (("batch, float32", many.astype(np.float32)), ("batch, float64", many)):
                 end = time.perf_counter() + options.seconds / 5
                 while time.perf_counter() < end:
@@ -342,6 +345,22 @@ def compare(title, makers, pair, poses, options, judge):
         print(f"{title:<34} {name:<22} {ns / 1e3:>10.2f} us {ns / times['prolate']:>8.2f} {wrong}", flush=True)
 
 
+def import_times():
+    def taken(program):
+        start = time.perf_counter()
+        return subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode, start
+
+    programs = {"": "pass", **{name: f"import {name}" for name in ("prolate", "numpy", "coal", "fcl", "mujoco")}}
+    times = {name: [] for name in programs}
+    for _ in range(11):
+        for name, program in programs.items():
+            failed, start = taken(program)
+            times[name].append(float("nan") if failed else time.perf_counter() - start)
+    bare = statistics.median(times.pop(""))
+    for name, took in times.items():
+        print(f"{'import':<34} {name:<22} {1e3 * (statistics.median(took) - bare):>10.1f} ms", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--poses", type=int, default=100)
@@ -352,6 +371,7 @@ def main():
     options = parser.parse_args()
     rng = np.random.default_rng(1)
     bodies = {}
+    import_times()
     print(f"{'query':<34} {'package':<22} {'median':>13} {'ratio':>8} wrong")
     for name_a, name_b in (("knight", "knight"), ("horse", "horse"), ("bunny", "horse")):
         if options.only not in f"{name_a}-{name_b}":

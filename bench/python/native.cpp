@@ -1,7 +1,9 @@
 // The time of collide_poses() without Python:    native A.etree B.etree POSES SECONDS
 //
-// POSES is a file of float32 poses, x y z qx qy qz qw, of B; A stands at the identity. Prints the least time of a pose,
-// nanoseconds, of all of them in one call, and of single calls of collide().
+// POSES is a file of float32 poses, x y z qx qy qz qw, of B; A stands at the identity. Prints two times, nanoseconds:
+// the least time of a pose, of all of them in one call; and the median over the poses of the least time of a call of
+// collide(), eight of them in a row.
+#include <prolate/collide.hpp>
 #include <prolate/poses.hpp>
 
 #include <algorithm>
@@ -44,6 +46,12 @@ int main(int argc, char** argv) {
     const double batch = least_time(seconds, [&] {
         if (!prolate::collide_poses(a->view(), here, b->view(), poses, out, {context.get(), 1})) std::abort();
     });
-    std::printf("%.1f\n", batch / static_cast<double>(poses.size()));
+    std::vector<double> single;
+    for (const prolate::Pose& pose : poses)
+        single.push_back(least_time(seconds / static_cast<double>(poses.size()), [&] {
+            for (int i = 0; i < 8; ++i) out[0] = collide(a->view(), here[0], b->view(), pose, *context);
+        }));
+    std::nth_element(single.begin(), single.begin() + single.size() / 2, single.end());
+    std::printf("%.1f %.1f\n", batch / static_cast<double>(poses.size()), single[single.size() / 2] / 8);
     return 0;
 }
