@@ -6,8 +6,8 @@ For each pair of meshes, poses are drawn so that the surfaces are *far*, *near* 
 diagonal) or *touching*. Each package is asked pose by pose, from Python, with its objects made beforehand. Its time is
 the median over the poses of the least of several turns, and the turns go round the packages. One that takes more than
 50 ms is asked at three poses only. "single, C++" is the call that prolate's single call makes, without Python; "batch"
-is prolate asked for 2,000 poses by one call. Ratios are to prolate's single call. "import" is how much longer a fresh
-Python takes to import a package, numpy included where it brings that, median of 11. Verdicts and distances are compared with coal.distance, which is exact for meshes; poses nearer than 1e-6
+is prolate asked for 2,000 poses by one call. Ratios are to prolate's single call. "import" is how much more
+processor time a fresh Python takes that imports a package (with numpy, where that brings it), median of 11. Verdicts and distances are compared with coal.distance, which is exact for meshes; poses nearer than 1e-6
 of the diagonal are not judged.
 
 Meshes are surfaces to Coal and FCL, so poses with one body inside the other are left out.
@@ -16,6 +16,7 @@ Meshes are surfaces to Coal and FCL, so poses with one body inside the other are
 from __future__ import annotations
 
 import argparse
+import resource
 import statistics
 import subprocess
 import sys
@@ -346,16 +347,17 @@ def compare(title, makers, pair, poses, options, judge):
 
 
 def import_times():
-    def taken(program):
-        start = time.perf_counter()
-        return subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode, start
+    def used():  # by ended children, seconds of all cores
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return usage.ru_utime + usage.ru_stime
 
     programs = {"": "pass", **{name: f"import {name}" for name in ("prolate", "numpy", "coal", "fcl", "mujoco")}}
     times = {name: [] for name in programs}
     for _ in range(11):
         for name, program in programs.items():
-            failed, start = taken(program)
-            times[name].append(float("nan") if failed else time.perf_counter() - start)
+            before = used()
+            failed = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode
+            times[name].append(float("nan") if failed else used() - before)
     bare = statistics.median(times.pop(""))
     for name, took in times.items():
         print(f"{'import':<34} {name:<22} {1e3 * (statistics.median(took) - bare):>10.1f} ms", flush=True)
