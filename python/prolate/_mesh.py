@@ -151,6 +151,20 @@ def arrays_of(mesh: Any) -> tuple[Any, Any]:
     return arrays
 
 
+def viewed(name: str, array: Any) -> Any:
+    """What other libraries' arrays hold, as numpy's, without a copy where they allow it; all else as it is."""
+    import numpy as np
+
+    if isinstance(array, (np.ndarray, list, tuple)):
+        return array
+    try:
+        if hasattr(array, "__array__"):
+            return np.asarray(array)
+        return np.from_dlpack(array) if hasattr(array, "__dlpack__") else array
+    except Exception as error:  # of a GPU, say
+        raise TypeError(f"{name}: cannot be read from here: {error}") from None
+
+
 def _foreign(mesh: Any) -> tuple[Any, Any] | None:
     import numpy as np
 
@@ -176,6 +190,7 @@ def placed(
     """
     import numpy as np
 
+    vertices, faces = viewed("vertices", vertices), viewed("faces", faces)
     is_array = isinstance(vertices, np.ndarray)
     if scale == (1.0, 1.0, 1.0) and origin is False and is_array and vertices.dtype == np.float32:
         return vertices, faces, None

@@ -79,8 +79,11 @@ def test_dlpack_comes_in():
             return self.array.__dlpack_device__()
 
     vertices, faces = box_mesh(HALF_A)
-    given = prolate.bake(np.from_dlpack(OnlyDlpack(vertices)), faces, exact=True)
-    assert given == prolate.bake(vertices, faces, exact=True)
+    given = prolate.bake(vertices, faces, exact=True)
+    for real, whole in ((np.float32, np.int32), (np.float64, np.int64)):
+        assert prolate.bake(OnlyDlpack(vertices.astype(real)), OnlyDlpack(faces.astype(whole)), exact=True) == given
+    with pytest.raises(TypeError, match="vertices"):
+        prolate.bake(OnlyDlpack(None), faces, exact=True)
     pose = OnlyDlpack(np.array([0, 0, 0, 0, 0, 0, 1.0]))
     assert prolate.collide(given, pose, given, pose) == prolate.Verdict.OVERLAPPING
 
