@@ -1,8 +1,7 @@
 // Points of hulls are corners of the triangles, chosen one by one: the farthest from the hull of the points so far. All
 // in the coordinates in which the node's ellipsoid is the unit ball, where no direction is special. Then they are
 // rounded, and what is left outside the rounded points' hull is measured: a corner's distance from it is at most that
-// from any convex combination of the points, and Gilbert's algorithm finds good ones (E. G. Gilbert 1966, "An iterative
-// procedure for computing the minimum of a quadratic form on a convex set").
+// from any convex combination of the points.
 //
 // Where a node's triangles are coplanar, or a face ends it, the record also holds a slab (src/slab.hpp).
 //
@@ -25,7 +24,7 @@
 namespace prolate {
 namespace {
 
-constexpr int kMostSteps = 200;
+constexpr int kMostSteps = 64;
 constexpr size_t kPlanes = 16; // that are tried for a slab
 // Of a node's size: a slab that is thicker tells no more than the hull, whose points are rounded, unless it ends with a
 // face. That is at least kFewest triangles, and that share of the node's area, which are as near to a plane as floats
@@ -36,26 +35,127 @@ constexpr size_t kFewest = 16;
 // is at most 2^14.
 constexpr double kRounding = 1e-9;
 
+// The convex combination of at most four of the points that is nearest to w, found as in P. Wolfe 1976, "Finding the
+// nearest point in a polytope": the point that is farthest towards w joins those that the combination is of, and those
+// that the nearest point of their affine hull needs less than nothing of leave.
+class NearestCombination {
+public:
+    NearestCombination(std::span<const Vec> points, const Vec& w) : points_(points), w_(w) {
+        corners_[0] = farthest(w), weights_[0] = 1;
+        x_ = points[corners_[0]];
+    }
+    double distance() const { return (w_ - x_).norm(); }
+    // False once it is as near as it gets.
+    bool improve() {
+        const Vec to = w_ - x_;
+        const size_t next = farthest(to);
+        const double along = to.dot(points_[next] - x_);
+        if (!(along > kLeastStep * to.squaredNorm()) || count_ == 4) return false;
+        corners_[count_] = next, weights_[count_++] = 0;
+        while (!settle())
+            if (count_ == 0) return false;
+        Vec x = Vec::Zero();
+        for (size_t i = 0; i < count_; ++i) x += weights_[i] * points_[corners_[i]];
+        const bool nearer = (w_ - x).squaredNorm() < to.squaredNorm();
+        if (nearer) x_ = x;
+        return nearer;
+    }
+
+private:
+    static constexpr double kLeastStep = 1e-3;
+
+    size_t farthest(const Vec& direction) const {
+        size_t best = 0;
+        double most = -HUGE_VAL;
+        for (size_t i = 0; i < points_.size(); ++i)
+            if (const double d = direction.dot(points_[i]); d > most) most = d, best = i;
+        return best;
+    }
+    // Moves the weights to those of the nearest point of the affine hull, or as far as none is below 0, and then drops
+    // the corner that stopped them. True if none did. Without corners, it has failed.
+    bool settle() {
+        const std::array<double, 4> wanted = nearest_in_affine_hull();
+        double share = 1;
+        size_t stops = count_;
+        for (size_t i = 0; i < count_; ++i) {
+            if (wanted[i] > 0) continue;
+            const double reached = weights_[i] / (weights_[i] - wanted[i]);
+            if (!(reached >= share)) share = reached, stops = i;
+        }
+        if (stops == count_) {
+            weights_ = wanted;
+            return true;
+        }
+        for (size_t i = 0; i < count_; ++i) weights_[i] += share * (wanted[i] - weights_[i]);
+        --count_;
+        for (size_t i = stops; i < count_; ++i) corners_[i] = corners_[i + 1], weights_[i] = weights_[i + 1];
+        return false;
+    }
+    // Weights of the corners, which sum to 1. Of corners in one plane, on one line or in one place, not a number.
+    std::array<double, 4> nearest_in_affine_hull() const {
+        const Vec &origin = points_[corners_[0]], to = w_ - origin;
+        std::array<double, 4> out{1, 0, 0, 0};
+        if (count_ == 1) return out;
+        const auto edge = [&](size_t i) { return points_[corners_[i]] - origin; };
+        const Vec d = edge(1);
+        if (count_ == 2) {
+            out[1] = to.dot(d) / d.squaredNorm();
+        } else {
+            const Vec e = edge(2), n = d.cross(e);
+            if (count_ == 3) {
+                out[1] = to.cross(e).dot(n) / n.squaredNorm(), out[2] = d.cross(to).dot(n) / n.squaredNorm();
+            } else {
+                const Vec f = edge(3);
+                const double volume = n.dot(f);
+                out[1] = to.cross(e).dot(f) / volume, out[2] = d.cross(to).dot(f) / volume, out[3] = n.dot(to) / volume;
+            }
+        }
+        out[0] = 1 - (out[1] + out[2] + out[3]);
+        return out;
+    }
+
+    std::span<const Vec> points_;
+    const Vec w_;
+    Vec x_;
+    std::array<size_t, 4> corners_{};
+    std::array<double, 4> weights_{};
+    size_t count_ = 1;
+};
+
 // An upper bound on the distance of w from the convex hull of the points, close to it if it is above `enough`.
 double distance_from_hull(std::span<const Vec> points, const Vec& w, double enough) {
-    Vec x = points[0];
-    double nearest = (w - x).norm();
-    for (int step = 0; step < kMostSteps && nearest > enough; ++step) {
-        const Vec to = w - x;
-        size_t farthest = 0;
-        for (size_t i = 1; i < points.size(); ++i)
-            if (to.dot(points[i]) > to.dot(points[farthest])) farthest = i;
-        const Vec edge = points[farthest] - x;
-        const double along = to.dot(edge);
-        if (!(along > 1e-3 * to.squaredNorm())) break; // as near as it gets
-        x += std::min(1.0, along / edge.squaredNorm()) * edge;
-        nearest = std::min(nearest, (w - x).norm());
+    NearestCombination nearest(points, w);
+    double distance = nearest.distance();
+    for (int step = 0; step < kMostSteps && distance > enough && nearest.improve(); ++step)
+        distance = nearest.distance();
+    return distance;
+}
+
+// Those that are the farthest along some direction, if there are many: the hull of the others is not much smaller.
+std::vector<Vec> outermost(const std::vector<Vec>& w) {
+    const auto directions = sketch_directions();
+    if (w.size() <= 2 * directions.size()) return w;
+    std::vector<size_t> chosen;
+    for (const Vec& d : directions) {
+        size_t low = 0, high = 0;
+        double least = HUGE_VAL, most = -HUGE_VAL;
+        for (size_t i = 0; i < w.size(); ++i) {
+            const double height = d.dot(w[i]);
+            if (height < least) least = height, low = i;
+            if (height > most) most = height, high = i;
+        }
+        chosen.insert(chosen.end(), {low, high});
     }
-    return nearest;
+    std::sort(chosen.begin(), chosen.end());
+    chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+    std::vector<Vec> out;
+    for (const size_t i : chosen) out.push_back(w[i]);
+    return out;
 }
 
 // Some of the points, whose hull the others are near.
 std::vector<Vec> choose(const std::vector<Vec>& w) {
+    if (w.size() <= kHullPoints) return w;
     std::vector<Vec> out;
     const auto farthest = [&](auto&& distance) {
         size_t best = 0;
@@ -192,7 +292,7 @@ void describe(const TreeView& tree, uint32_t node, std::byte* record) {
     describe_slab(tree, at, fit.factor.norm(), record);
     std::vector<Vec> w = std::move(at.corners);
     for (Vec& x : w) x = fit.radial(x);
-    const std::vector<Vec> chosen = choose(w);
+    const std::vector<Vec> candidates = outermost(w), chosen = choose(candidates);
     for (size_t i = 0; i < kHullPoints; ++i) // the last again where there are fewer
         for (size_t k = 0; k < 3; ++k) {
             const double x = chosen[std::min(i, chosen.size() - 1)][static_cast<int>(k)];
@@ -200,8 +300,10 @@ void describe(const TreeView& tree, uint32_t node, std::byte* record) {
             store_le(record + kHullPoint + kHullPoints * k + i, static_cast<int8_t>(q));
         }
     const Hull hull(record);
-    double most = hull.distance(Vec::Zero(), 0); // the center, too: FORMAT.md
-    for (const Vec& x : w) most = std::max(most, hull.distance(x, most)), checkpoint();
+    double most = hull.distance(Vec::Zero(), 0);                                   // the center, too: FORMAT.md
+    for (const Vec& x : candidates) most = std::max(most, hull.distance(x, most)); // what others are compared with
+    Checkpoints checkpoints;
+    for (const Vec& x : w) most = std::max(most, hull.distance(x, most)), checkpoints();
     const double share = std::ceil((most + kRounding) * kHullShares);
     store_le(record + kHullShare, static_cast<uint8_t>(share <= kHullShares ? share : 0));
 }

@@ -18,7 +18,9 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <tuple>
+#include <vector>
 
 namespace prolate {
 namespace {
@@ -80,6 +82,32 @@ bool in_hull(const Hull& hull, const Vec& w) {
     return hull.distance(w, enough) <= enough;
 }
 
+// For each vertex, the leaves of the triangles that it belongs to.
+class LeavesOfVertices {
+public:
+    explicit LeavesOfVertices(const TreeView& tree) : first_(size_t{tree.vertex_count()} + 2) {
+        const auto for_each_corner = [&](auto&& visit) {
+            tree.for_each_node([&](uint32_t leaf) {
+                checkpoint();
+                const TriangleRange range = tree.triangles(leaf);
+                for (uint32_t t = range.first; t < range.first + range.count; ++t)
+                    for (const uint32_t v : tree.triangle(t)) visit(v, leaf);
+            });
+        };
+        for_each_corner([&](uint32_t v, uint32_t) { ++first_[v + 2]; });
+        for (size_t v = 2; v < first_.size(); ++v) first_[v] += first_[v - 1];
+        leaves_.resize(first_.back());
+        for_each_corner([&](uint32_t v, uint32_t leaf) { leaves_[first_[v + 1]++] = leaf; });
+    }
+    std::span<const uint32_t> of(uint32_t v) const {
+        return std::span(leaves_).subspan(first_[v], first_[v + 1] - first_[v]);
+    }
+
+private:
+    std::vector<size_t> first_;
+    std::vector<uint32_t> leaves_;
+};
+
 // For each node, a corner beneath it that it, its hull or its slab does not hold.
 std::vector<Doubt> find_doubts(const TreeView& tree) {
     const uint32_t slots = tree.slot_count();
@@ -104,22 +132,22 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         if (const Vec3 c = ellipsoids[n].center; hulls[n] && !in_hull(*hulls[n], Vec::Zero()))
             doubts[n].set(c.x, c.y, c.z);
     });
-    tree.for_each_node([&](uint32_t leaf) {
-        checkpoint();
-        const TriangleRange triangles = tree.triangles(leaf);
-        for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
-            for (const uint32_t corner : tree.triangle(t)) {
-                const Vec3 v = tree.vertex(corner);
-                const double p[3] = {v.x, v.y, v.z};
-                for (uint32_t node = leaf;; node = parent[node]) {
-                    if (!(radial_squared(ellipsoids[node], p) <= largest[node]) ||
-                        (hulls[node] && !in_hull(*hulls[node], fits[node].radial(to_vec(v)))) ||
-                        (slabs[node] && !in_slab(*slabs[node], to_vec(v))))
-                        doubts[node].set(p[0], p[1], p[2]);
-                    if (node == 0) break;
-                }
+    const LeavesOfVertices leaves(tree);
+    std::vector<uint32_t> looked_at(slots, UINT32_MAX); // the vertex that a node has last been asked for
+    Checkpoints checkpoints;
+    for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
+        checkpoints();
+        const Vec3 at = tree.vertex(v);
+        const double p[3] = {at.x, at.y, at.z};
+        for (const uint32_t leaf : leaves.of(v))
+            for (uint32_t node = leaf; looked_at[node] != v; node = parent[node]) { // the root is its own parent
+                looked_at[node] = v;
+                if (!(radial_squared(ellipsoids[node], p) <= largest[node]) ||
+                    (hulls[node] && !in_hull(*hulls[node], fits[node].radial(to_vec(at)))) ||
+                    (slabs[node] && !in_slab(*slabs[node], to_vec(at))))
+                    doubts[node].set(p[0], p[1], p[2]);
             }
-    });
+    }
     return doubts;
 }
 
