@@ -13,8 +13,8 @@
 namespace prolate {
 namespace {
 
-constexpr uint32_t kSortedBelow = 2048; // triangles of a part; above, bins find the split
-constexpr uint32_t kBins = 256;
+constexpr uint32_t kSortedBelow = 128;                            // triangles of a part; above, bins find the split
+constexpr uint32_t kLeastBins = 32, kMostBins = 256, kPerBin = 8; // triangles, about
 constexpr uint32_t kParallelAbove = 512; // triangles of a node whose children are worth tasks of their own
 
 } // namespace
@@ -72,11 +72,12 @@ BinaryTree::Cut BinaryTree::cut_sorted(const Part& p, const Vec& axis) const {
 BinaryTree::Cut BinaryTree::cut_binned(const Part& p, const Vec& axis) const {
     const std::vector<Key> all = keys(p, axis);
     const auto [low, high] = std::minmax_element(all.begin(), all.end());
-    const double scale = kBins / (high->first - low->first);
+    const uint32_t count = std::clamp(p.size() / kPerBin, kLeastBins, kMostBins);
+    const double scale = count / (high->first - low->first);
     if (!std::isfinite(scale)) return {};
-    std::vector<Group> bins(kBins);
+    std::vector<Group> bins(count);
     for (const auto& [h, triangle] : all) {
-        Group& bin = bins[std::min(static_cast<uint32_t>((h - low->first) * scale), kBins - 1)];
+        Group& bin = bins[std::min(static_cast<uint32_t>((h - low->first) * scale), count - 1)];
         bin.extents.add(extents_[triangle]);
         ++bin.triangles;
     }
@@ -110,7 +111,7 @@ uint32_t BinaryTree::cut(const Part& p, uint64_t most) {
     const auto try_axis = [&](size_t a) {
         cuts[a] = p.size() > kSortedBelow ? cut_binned(p, axes[a]) : cut_sorted(p, axes[a]);
     };
-    if (p.size() > kSortedBelow)
+    if (p.size() > kParallelAbove)
         parallel_for(size_t{0}, cuts.size(), try_axis);
     else
         for (size_t a = 0; a < cuts.size(); ++a) try_axis(a);

@@ -59,7 +59,7 @@ struct Node {
     format::PackedNode packed;
 };
 
-// A sketch of few points names each of them many times, and fitting takes time for each.
+// Triangles share corners, and a sketch names some of its points many times; fitting takes time for each.
 std::vector<Vec> without_repeats(std::span<const Vec> points) {
     std::vector<Vec> out(points.begin(), points.end());
     const auto less = [](const Vec& p, const Vec& q) {
@@ -182,7 +182,12 @@ private:
     // The node's ellipsoid.
     void cover(Node& node, const Sketch& sketch) {
         checkpoint();
-        std::vector<Vec> core = without_repeats(sketch.points());
+        std::vector<Vec> core(sketch.points().begin(), sketch.points().end());
+        if (core.size() > 3 * size_t{size_of(node.binary)}) {
+            core.clear();
+            for_each_corner(node, [&](const Vec& p) { core.push_back(p); });
+        }
+        core = without_repeats(core);
         Fit fit;
         for (int round = 0; round < kRounds; ++round) {
             fit = enclosing_ellipsoid(core, options_.min_radius);

@@ -5,7 +5,9 @@
 //
 // Where a node's triangles are coplanar, or a face ends it, the record also holds a slab (src/slab.hpp).
 //
-// Complexity: O(n) an inner node of n corners, with a large constant (some thousand products a corner).
+// Of many corners, the points are chosen among those that are the farthest along some direction.
+//
+// Complexity: O(n) an inner node of n corners, some hundred products a corner.
 #include "builder/hulls.hpp"
 
 #include "builder/fit.hpp"
@@ -149,6 +151,7 @@ std::vector<Vec> outermost(const std::vector<Vec>& w) {
     std::sort(chosen.begin(), chosen.end());
     chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
     std::vector<Vec> out;
+    out.reserve(chosen.size());
     for (const size_t i : chosen) out.push_back(w[i]);
     return out;
 }
