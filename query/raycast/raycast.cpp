@@ -44,7 +44,7 @@ RaycastResult cast(const TreeView& tree, const Pose& pose, const Ray& ray, Scrat
                               std::numeric_limits<float>::max()); // an infinite one would make NaNs
     RaycastResult out;
     const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
-    query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.bound(0), tree.scale());
+    query::PlacedEllipsoid root = query::place(growth ? tree.root() : tree.root_bound(), tree.scale());
     if (growth) root.size *= double{growth[0]}, root.reach *= double{growth[0]};
     const query::PlacedRay placed = query::place(ray, to_frame, root, options.margin);
     if (!placed.valid) return out;

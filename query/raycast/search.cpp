@@ -1,8 +1,9 @@
 // Ray against tree: eight children at a time, nearest first.
 //
-// The kernel (lanes-inl.hpp) gives a lower bound of the parameter at which the ray enters each child. Children wait
-// on a stack, the nearest on top, and are skipped when the best hit so far lies before their bound. Leaves are decided
-// in double precision (ray.hpp).
+// The kernel (lanes-inl.hpp) gives a lower bound of the parameter at which the ray enters each child: its box, and its
+// ellipsoid, too, unless the tree is exact and the ray thin. (Boxes alone take 20 % less time on the horse, the bunny
+// and machine parts, and 2 to 6 % on coarse meshes.) Children wait on a stack, the nearest on top, and are skipped when
+// the best hit so far lies before their bound. Leaves are decided in double precision (ray.hpp).
 //
 // Sound because a node's bounding volume holds all leaves below it: where the ray misses the node, it misses these. To
 // meet the ellipsoids of a cut, also of an exact tree (raycast_cut), the nodes' own are grown until they hold all below
@@ -73,7 +74,7 @@ private:
             const BoxRay boxes = box_ray(block, s_.lattice_ray);
             for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
                 Float enter = box_entries(block, i, boxes, limit);
-                if (!all(enter > limit))
+                if ((kThick || !boxes_suffice_) && !all(enter > limit))
                     enter = max(enter, entry_lanes<kThick>(load_nodes(block, i, step_exponent), s_.lattice_ray, limit));
                 store(enter, entries + i);
             }
@@ -96,6 +97,8 @@ private:
     }
 
     RaycastSearch& s_;
+    // Around a few triangles, boxes are about as close as ellipsoids, and cost a quarter.
+    const bool boxes_suffice_ = s_.side.tree.has_triangles();
     uint32_t size_ = 0, base_ = 0;
     float limit_ = 1; // parameter of the best hit
 };
