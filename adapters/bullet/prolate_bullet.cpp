@@ -9,6 +9,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btConvexShape.h>
 #include <BulletCollision/CollisionShapes/btShapeHull.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
@@ -46,14 +47,21 @@ btTransform to_bullet(const Pose& pose) {
     return btTransform(btQuaternion(q.x, q.y, q.z, q.w).normalized(), to_bullet(pose.translation));
 }
 
-// What stands in for one of Bullet's convex shapes: an exact box or ball, else a polyhedron of its corners, or of 42
-// points of its surface. Empty if it has no volume.
+// What stands in for one of Bullet's convex shapes: an exact box, ball or capsule, else a polyhedron of its corners, or
+// of 42 points of its surface. Empty if it has no volume.
 std::optional<Tree> tree_of(const btCollisionShape& shape) {
     const auto take = [](auto made) { return made ? std::optional<Tree>(std::move(*made)) : std::nullopt; };
     if (shape.getShapeType() == BOX_SHAPE_PROXYTYPE)
         return take(prolate::box_tree(to_prolate(static_cast<const btBoxShape&>(shape).getHalfExtentsWithMargin())));
     if (shape.getShapeType() == SPHERE_SHAPE_PROXYTYPE)
-        return take(prolate::sphere_tree(static_cast<float>(static_cast<const btSphereShape&>(shape).getRadius())));
+        return take(
+            prolate::capsule_tree({}, {}, static_cast<float>(static_cast<const btSphereShape&>(shape).getRadius())));
+    if (shape.getShapeType() == CAPSULE_SHAPE_PROXYTYPE) {
+        const auto& capsule = static_cast<const btCapsuleShape&>(shape);
+        btVector3 end(0, 0, 0);
+        end[capsule.getUpAxis()] = capsule.getHalfHeight();
+        return take(prolate::capsule_tree(to_prolate(-end), to_prolate(end), static_cast<float>(capsule.getRadius())));
+    }
     if (!shape.isConvex()) return {};
     btShapeHull hull(static_cast<const btConvexShape*>(&shape));
     if (!hull.buildHull(shape.getMargin())) return {};

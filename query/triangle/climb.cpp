@@ -54,6 +54,14 @@ double Hills::height(uint32_t vertex, const dvec3& up) const noexcept {
 // Calls visit(corners) for each triangle that has this vertex.
 template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) const {
     if (tests_ > most_tests_) return;
+    Known& known = known_[vertex % kKnown];
+    if (known.vertex == vertex) {
+        tests_ += known.tests;
+        for (uint32_t i = 0; i < known.count; ++i) visit(tree_.triangle(known.triangles[i]));
+        return;
+    }
+    const uint64_t before = tests_;
+    known.vertex = vertex, known.count = 0;
     const BoxProbe probe(tree_.raw().lattice(), tree_.vertex(vertex));
     struct Family {
         uint32_t first, left; // siblings from slot `first` on
@@ -80,10 +88,15 @@ template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) 
             tests_ += triangles;
             for (uint32_t t = begin; t < begin + triangles; ++t) {
                 const Triangle corners = tree_.triangle(t);
-                if (std::find(corners.begin(), corners.end(), vertex) != corners.end()) visit(corners);
+                if (std::find(corners.begin(), corners.end(), vertex) == corners.end()) continue;
+                if (known.count < Known::kMost) known.triangles[known.count] = t;
+                ++known.count;
+                visit(corners);
             }
         }
     }
+    known.tests = static_cast<uint32_t>(tests_ - before);
+    if (known.count > Known::kMost) known.vertex = UINT32_MAX;
 }
 
 uint32_t Hills::step(uint32_t vertex, const dvec3& up) const noexcept {

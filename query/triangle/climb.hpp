@@ -4,7 +4,8 @@
 // Neighbours are found by the vertices' indices: triangles hang together where they share a vertex. A vertex's
 // triangles lie in leaves whose boxes hold it, a few of them.
 //
-// Complexity: a step is a descent to the leaves around one vertex, about ten blocks; kClimbSteps at most.
+// Complexity: a step is a descent to the leaves around one vertex, about ten blocks; kClimbSteps at most. The last few
+// vertices' triangles are kept: climbs of neighbouring pairs pass the same ones.
 #pragma once
 
 #include <prolate/tree.hpp>
@@ -22,7 +23,9 @@ class Hills {
 public:
     /// `tests` counts nodes and triangles looked at; nothing rises any more once they exceed `most_tests`.
     Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests) noexcept
-        : tree_(tree), tests_(tests), most_tests_(most_tests) {}
+        : tree_(tree), tests_(tests), most_tests_(most_tests) {
+        for (Known& known : known_) known.vertex = UINT32_MAX;
+    }
 
     double height(uint32_t vertex, const glm::dvec3& up) const noexcept;
     /// The highest neighbour of a vertex along `up`, if it is higher than the vertex; else the vertex itself.
@@ -34,9 +37,17 @@ public:
 private:
     template <class Visit> void triangles_at(uint32_t vertex, Visit&& visit) const;
 
+    // The triangles of a vertex, and what it took to find them, which counts each time that they are asked for.
+    struct Known {
+        static constexpr uint32_t kMost = 10; // few vertices have more
+        uint32_t vertex, tests, count, triangles[kMost];
+    };
+    static constexpr uint32_t kKnown = 16;
+
     const TreeView& tree_;
     uint64_t& tests_;
     const uint64_t most_tests_;
+    mutable Known known_[kKnown];
 };
 
 /// A climb, a step at a time.
