@@ -1,4 +1,4 @@
-// Bodies fall on a plane in Bullet, as prolate trees and as Bullet's own GImpact meshes:  bullet_fall [BODIES]
+// Bodies fall on a plane in Bullet, as prolate trees and as Bullet's own GImpact meshes:  bullet_fall [BODIES] [HERTZ]
 //
 // Fails if a body of trees does not come to rest, or sinks into the plane by more than 1 % of its diagonal, or if the
 // energy rises. Prints for both: contacts, the median time of a step in which something moves, the deepest that a body
@@ -32,8 +32,8 @@ double cpu_ms() {
     return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
-constexpr btScalar kGravity = 9.81f, kStep = 1.0f / 240;
-constexpr int kSteps = 240 * 10;
+constexpr btScalar kGravity = 9.81f;
+constexpr int kSeconds = 10;
 
 struct Outcome {
     double energy = 0, median_ms = 0, sunk = 0, rest_speed = 0, energy_gain = 0, contacts = 0;
@@ -42,7 +42,8 @@ struct Outcome {
 // A world with a plane, and bodies of one shape in a loose stack.
 class Scene {
 public:
-    Scene(btCollisionShape& shape, const btVector3& inertia, int bodies) : dispatcher_(&configuration_) {
+    Scene(btCollisionShape& shape, const btVector3& inertia, int bodies, int hertz)
+        : hertz_(hertz), dispatcher_(&configuration_) {
         world_.setGravity({0, 0, -kGravity});
         world_.getDispatchInfo().m_useContinuous = false;
         world_.getSolverInfo().m_numIterations = 30;
@@ -58,7 +59,11 @@ public:
     }
     btCollisionDispatcher& dispatcher() { return dispatcher_; }
     const std::vector<std::unique_ptr<btRigidBody>>& bodies() const { return bodies_; } // the plane first
-    void step() { world_.stepSimulation(kStep, 0, kStep); }
+    int steps() const { return hertz_ * kSeconds; }
+    void step() {
+        const btScalar length = btScalar{1} / static_cast<btScalar>(hertz_);
+        world_.stepSimulation(length, 0, length);
+    }
     int contacts() const {
         int out = 0;
         for (int i = 0; i < dispatcher_.getNumManifolds(); ++i)
@@ -94,6 +99,7 @@ private:
         world_.addRigidBody(bodies_.emplace_back(std::make_unique<btRigidBody>(info)).get());
     }
 
+    const int hertz_;
     btDefaultCollisionConfiguration configuration_;
     btCollisionDispatcher dispatcher_;
     btDbvtBroadphase broadphase_;
@@ -117,7 +123,7 @@ Outcome run(Scene& scene, const prolate_bullet::TreeShape& frame) {
     std::vector<double> times;
     double contacts = 0, energy = scene.energy();
     out.energy = energy;
-    for (int i = 0; i < kSteps; ++i) {
+    for (int i = 0; i < scene.steps(); ++i) {
         const double start = cpu_ms();
         scene.step();
         const double taken = cpu_ms() - start;
@@ -126,7 +132,7 @@ Outcome run(Scene& scene, const prolate_bullet::TreeShape& frame) {
         const double now = scene.energy();
         out.energy_gain = std::max(out.energy_gain, now - energy);
         energy = std::min(energy, now);
-        if (i % 16 != 0 && i + 1 < kSteps) continue;
+        if (i % 16 != 0 && i + 1 < scene.steps()) continue;
         for (size_t k = 1; k < scene.bodies().size(); ++k) {
             prolate::ContactManifolds manifolds;
             prolate::contacts(frame.tree(), frame.pose_of(scene.bodies()[k]->getWorldTransform()), {{0, 0, 1}, 0},
@@ -137,7 +143,7 @@ Outcome run(Scene& scene, const prolate_bullet::TreeShape& frame) {
         }
     }
     std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2), times.end());
-    out.median_ms = times[times.size() / 2], out.contacts = contacts / kSteps, out.rest_speed = scene.fastest();
+    out.median_ms = times[times.size() / 2], out.contacts = contacts / scene.steps(), out.rest_speed = scene.fastest();
     return out;
 }
 
@@ -150,18 +156,18 @@ void print(const char* name, const Outcome& o, double diagonal) {
 } // namespace
 
 int main(int argc, char** argv) {
-    const int bodies = argc > 1 ? std::atoi(argv[1]) : 100;
+    const int bodies = argc > 1 ? std::atoi(argv[1]) : 100, hertz = argc > 2 ? std::atoi(argv[2]) : 240;
     prolate::Mesh mesh = prolate::shapes::torus(0.35f, 0.15f, 24, 12);
     const auto built = prolate::build(mesh.view(), {.exact = true});
     if (!built) return std::fprintf(stderr, "bullet_fall: %s\n", built.error().what), 1;
     prolate_bullet::TreeShape shape(built->tree.view());
-    shape.setMargin(0.04f); // 10 m/s
+    shape.setMargin(10.0f / static_cast<btScalar>(hertz)); // 10 m/s
     btVector3 inertia;
     shape.calculateLocalInertia(1, inertia);
 
     Outcome ours, theirs;
     {
-        Scene scene(shape, inertia, bodies);
+        Scene scene(shape, inertia, bodies, hertz);
         const prolate_bullet::Trees trees(scene.dispatcher());
         ours = run(scene, shape);
     }
@@ -178,11 +184,11 @@ int main(int argc, char** argv) {
     gimpact.setMargin(0.01f);
     gimpact.updateBound();
     {
-        Scene scene(gimpact, inertia, bodies);
+        Scene scene(gimpact, inertia, bodies, hertz);
         btGImpactCollisionAlgorithm::registerAlgorithm(&scene.dispatcher());
         theirs = run(scene, shape);
     }
-    std::printf("%d tori of %zu triangles, %d steps of 1/240 s\n", bodies, mesh.triangles.size(), kSteps);
+    std::printf("%d tori of %zu triangles, %d s in steps of 1/%d s\n", bodies, mesh.triangles.size(), kSeconds, hertz);
     print("prolate", ours, built->diagonal), print("GImpact", theirs, built->diagonal);
     std::printf("time of GImpact over prolate: %.2f\n", theirs.median_ms / ours.median_ms);
     const bool good =
