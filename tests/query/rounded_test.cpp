@@ -204,6 +204,7 @@ TEST(Rounded, WhateverIsRoundedAnswersAsItsCoreWithAMargin) {
     bytes.push_back(scenes::exact_tree(shapes::torus(1, 0.3f, 24, 12)).bytes);
     bytes.push_back(scenes::tree(random, scenes::cloud(random, 200), {.degree = 8, .levels = 3}).bytes);
     std::vector<TreeView> cores;
+    cores.reserve(bytes.size());
     for (const auto& b : bytes) cores.push_back(*TreeView::open(b));
     const auto context = std::make_unique<QueryContext>();
     uint32_t hits = 0, meeting = 0;
