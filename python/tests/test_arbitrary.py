@@ -125,7 +125,7 @@ def functions(tree, world):
     }
 
 
-SLOW = {"Tree.render": 25, "Tree.view": 6, "Tree.export": 25, "Tree.verify": 60, "bake": 120, "bake_many": 40}
+SLOW = {"Tree.render": 20, "Tree.view": 6, "Tree.export": 20, "Tree.verify": 60, "bake": 80, "bake_many": 40}
 
 
 def usual(name, parameter, default):
@@ -175,7 +175,7 @@ def test_anything(name, cover, box_a, tmp_path, monkeypatch):
         function()
         return
 
-    @settings(max_examples=SLOW.get(name, 150), deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @settings(max_examples=SLOW.get(name, 100), deadline=None, database=None, suppress_health_check=list(HealthCheck))
     @given(arguments(name, parameters))
     def run(given_):
         survive(function, parameters, given_)

@@ -210,15 +210,18 @@ def frame_mesh():
 
 def test_clearance_is_a_length_and_holes_stay_free():
     mesh = frame_mesh()
-    near = prolate.bake(*box_mesh(), clearance="60cm", ellipsoids=9, quality="fast")
-    assert near.info.goal_reached and near.info.levels[-1].hausdorff_max <= 0.6
-    assert near.info.asked.ellipsoids == 9 and near.info.asked.distance == pytest.approx(60 / near.info.diagonal)
-    assert near.info.hole_radius is None
-    open_ = prolate.bake(*mesh, keep_holes=0.2, quality="fast")
-    assert open_.info.hole_radius >= 0.2 and open_.info.asked.keep_holes == pytest.approx(0.2)
+    near = prolate.bake(*box_mesh(), clearance="60cm", ellipsoids=1, quality="fast").info
+    assert near.goal_reached == (near.levels[-1].hausdorff_max <= 0.6) and near.hole_radius is None
+    assert near.asked.ellipsoids == 1 and near.asked.distance == pytest.approx(60 / near.diagonal)
+    few = prolate.bake(*mesh, keep_holes=0.2, ellipsoids=8, quality="fast")
+    proof = few.verify(*mesh)
+    assert not few.info.goal_reached and few.info.hole_radius < 0.2
+    assert not proof and not proof.holes_kept and np.abs(proof.blocked).max() < 2
+    open_ = prolate.bake(*mesh, keep_holes=0.3, quality="fast")
+    assert open_.info.hole_radius >= 0.3 and open_.info.asked.keep_holes == pytest.approx(0.3)
     proof = open_.verify(*mesh)
     assert proof and proof.holes_kept and proof.blocked is None
-    ball = prolate.Sphere((0, 0, 0), 0.2)
+    ball = prolate.Sphere((0, 0, 0), 0.3)
     path = np.array([[0, 0, z, 0, 0, 0, 1] for z in np.linspace(-1, 1, 9)])
     assert (prolate.overlap(open_, path, ball) == prolate.Verdict.SEPARATED).all()
     least, most = prolate.ball_range(2)
