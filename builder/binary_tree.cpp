@@ -15,7 +15,6 @@ namespace {
 
 constexpr uint32_t kSortedBelow = 128;                            // triangles of a part; above, bins find the split
 constexpr uint32_t kLeastBins = 32, kMostBins = 256, kPerBin = 8; // triangles, about
-constexpr uint32_t kParallelAbove = 512; // triangles of a node whose children are worth tasks of their own
 
 } // namespace
 

@@ -14,6 +14,8 @@
 
 namespace prolate {
 
+inline constexpr uint32_t kParallelAbove = 512; ///< triangles of a node whose children are worth tasks of their own
+
 /// Of points along the axes and face diagonals.
 struct Extents {
     static constexpr size_t kDirections = 9;

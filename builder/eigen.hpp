@@ -5,6 +5,8 @@
 
 #include <prolate/types.hpp>
 
+#include <algorithm>
+
 namespace prolate {
 
 using Vec = Eigen::Vector3d;
@@ -12,6 +14,10 @@ using Mat = Eigen::Matrix3d;
 
 inline Vec to_vec(const Vec3& v) {
     return {v.x, v.y, v.z};
+}
+
+inline bool lexicographically_before(const Vec& a, const Vec& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
 
 /// Axis-aligned box; empty until something is added.

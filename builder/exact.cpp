@@ -32,7 +32,6 @@
 namespace prolate {
 namespace {
 
-constexpr uint32_t kParallelAbove = 512; // triangles of a node whose children are worth tasks of their own
 // Of a query at a leaf, and for each of its triangles; in tests of a block of children. Pairs of triangles are tested
 // eight at a time, so that a leaf of several costs little more than one of a single triangle.
 constexpr double kLeafCost = 0.7, kTriangleCost = 0.3;

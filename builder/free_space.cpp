@@ -9,7 +9,7 @@ namespace prolate {
 namespace {
 
 constexpr int kBlock = 16;          // nodes of a task, along each axis
-constexpr double kRounding = 1e-12; // of the largest coordinate: of measured distances
+constexpr double kDistanceRounding = 1e-12; // of the largest coordinate: of measured distances
 constexpr float kRoundingOfFloat = 1 - 0x1p-22f;
 
 } // namespace
@@ -22,7 +22,7 @@ double round_pitch(double length) {
 
 FreeSpace::FreeSpace(const TriangleTree& surface, const Box& region, double pitch, double from, double to)
     : pitch_(pitch), from_(from), to_(to),
-      rounding_(kRounding * std::max(region.low.cwiseAbs().maxCoeff(), region.high.cwiseAbs().maxCoeff())) {
+      rounding_(kDistanceRounding * std::max(region.low.cwiseAbs().maxCoeff(), region.high.cwiseAbs().maxCoeff())) {
     std::array<int, 3> blocks{};
     for (size_t a = 0; a < 3; ++a) {
         first_[a] = std::floor(region.low[int(a)] / pitch) - 1;

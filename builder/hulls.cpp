@@ -35,7 +35,7 @@ constexpr double kThinSlab = 0x1p-12, kTouching = 0x1p-20, kShareOfFace = 0.125;
 constexpr size_t kFewest = 16;
 // More than rounding costs anywhere below, in unit-ball coordinates: in double, some 2^-53 times the axis ratio, which
 // is at most 2^14.
-constexpr double kRounding = 1e-9;
+constexpr double kShareRounding = 1e-9;
 
 // The convex combination of at most four of the points that is nearest to w, found as in P. Wolfe 1976, "Finding the
 // nearest point in a polytope": the point that is farthest towards w joins those that the combination is of, and those
@@ -307,7 +307,7 @@ void describe(const TreeView& tree, uint32_t node, std::byte* record) {
     for (const Vec& x : candidates) most = std::max(most, hull.distance(x, most)); // what others are compared with
     Checkpoints checkpoints;
     for (const Vec& x : w) most = std::max(most, hull.distance(x, most)), checkpoints();
-    const double share = std::ceil((most + kRounding) * kHullShares);
+    const double share = std::ceil((most + kShareRounding) * kHullShares);
     store_le(record + kHullShare, static_cast<uint8_t>(share <= kHullShares ? share : 0));
 }
 

@@ -18,7 +18,7 @@ constexpr double kClearance = 1e-3;  // of d from all arcs: that of the first tr
 constexpr double kNeedle = 1e-12;    // a triangle's smallest sine, below which it counts as a segment
 constexpr double kLongestArc = 2;    // radians; longer ones are cut, lest the chord of one be near a diameter
 constexpr double kBeyond = 1 + 1e-9; // squared distance beyond which a plane does not touch the ball, nor an edge in it
-constexpr size_t kNone = 3;
+constexpr size_t kNoEdge = 3;
 
 // std::atan2 to the last digit or two; several times as fast for the small angles that most arcs have.
 double angle_of(double y, double x) {
@@ -113,7 +113,7 @@ private:
         double twice_area = 0;
         Vec chords = Vec::Zero(), about_foot = Vec::Zero(); // sum of q - p over the pieces; first moment
         Vec p, q, entry, exit;
-        size_t entry_edge = kNone, exit_edge = kNone; // of an entry without its exit, of an exit without its entry
+        size_t entry_edge = kNoEdge, exit_edge = kNoEdge; // of an entry without its exit, of an exit without its entry
         bool whole = true;                            // nothing of the boundary is in the ball
         for (size_t i = 0; i < 3; ++i) {
             const Corner &from = *corners[i], &to = *corners[(i + 1) % 3];
@@ -127,15 +127,15 @@ private:
             chords += q - p;
             about_foot += triangle / 6 * (p + q - 2 * disc.foot);
             if (!from.inside()) {
-                if (exit_edge == kNone)
+                if (exit_edge == kNoEdge)
                     entry = p, entry_edge = i;
                 else
                     twice_area += disc.square * add_arc(disc, corners, exit, exit_edge, p, i);
             }
-            exit_edge = to.inside() ? kNone : i;
+            exit_edge = to.inside() ? kNoEdge : i;
             exit = q;
         }
-        if (exit_edge != kNone)
+        if (exit_edge != kNoEdge)
             twice_area += disc.square * add_arc(disc, corners, exit, exit_edge, entry, entry_edge + 3);
         if (whole) { // then the disc is in the triangle, or it misses it
             for (size_t i = 0; i < 3; ++i)

@@ -32,7 +32,7 @@
 namespace prolate {
 namespace {
 
-constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNoVertex = std::numeric_limits<uint32_t>::max();
 constexpr const char* kNoArea = "the mesh has no triangle with an area";
 constexpr double kSmallest = 1e-24; // diagonal: a leaf of kThinnestNodeOfMesh needs an exponent that the format has
 constexpr float kWeldSpacings = 8;  // of kDefaultWeld
@@ -199,12 +199,12 @@ bool is_redundant(const Triangle& t, std::span<const Side> sides, const std::vec
 
 // Numbers the used vertices in order and drops the others.
 void drop_unused(Mesh& mesh, MeshReport& report, std::span<const uint32_t> representative) {
-    std::vector<uint32_t> number(mesh.vertices.size(), kNone);
+    std::vector<uint32_t> number(mesh.vertices.size(), kNoVertex);
     for (const Triangle& t : mesh.triangles)
         for (const uint32_t corner : t) number[corner] = 0;
     uint32_t used = 0;
     for (uint32_t i = 0; i < number.size(); ++i) {
-        if (number[i] != kNone) {
+        if (number[i] != kNoVertex) {
             mesh.vertices[used] = mesh.vertices[i];
             number[i] = used++;
         } else if (representative[i] == i) {
@@ -280,7 +280,7 @@ double default_weld(float largest_coordinate) noexcept {
 }
 
 Result<void> check_mesh(MeshView mesh) {
-    constexpr size_t kMost = kNone - 1;
+    constexpr size_t kMost = kNoVertex - 1;
     if (mesh.triangles.empty()) return Error{ErrorCode::bad_mesh, "the mesh has no triangles"};
     if (mesh.vertices.size() > kMost || mesh.triangles.size() > kMost)
         return Error{ErrorCode::bad_mesh, "the mesh has too many vertices or triangles (2^32 or more)"};

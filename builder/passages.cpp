@@ -17,8 +17,8 @@ namespace {
 
 constexpr double kStepsOfRadius = 6; // in the ball's radius, ...
 constexpr double kMostSteps = 96;    // ... but not more than these in the box's longest side
-constexpr double kMargin = 0.15;     // of that side: how far around the mesh the lattice reaches, besides the ball
-constexpr double kRounding = 1e-12;  // of the largest coordinate
+constexpr double kRegionMargin = 0.15;     // of that side: how far around the mesh the lattice reaches, besides the ball
+constexpr double kCoordinateRounding = 1e-12;  // of the largest coordinate
 constexpr int kIterations = 60;      // of a bisection
 
 // Which of a node's neighbours are neighbours of each other, as bits.
@@ -170,9 +170,9 @@ Passages::Passages(MeshView mesh, double radius) {
     const double side = box.size().maxCoeff();
     const double pitch = std::max(radius / kStepsOfRadius, side / kMostSteps);
     needed_ = radius + 0.5 * std::sqrt(3.0) * pitch;
-    const Vec margin = Vec::Constant(needed_ + kMargin * side);
+    const Vec margin = Vec::Constant(needed_ + kRegionMargin * side);
     const Box region{box.low - margin, box.high + margin};
-    rounding_ = kRounding * std::max(region.low.cwiseAbs().maxCoeff(), region.high.cwiseAbs().maxCoeff());
+    rounding_ = kCoordinateRounding * std::max(region.low.cwiseAbs().maxCoeff(), region.high.cwiseAbs().maxCoeff());
     needed_ += rounding_;
     const FreeSpace space(TriangleTree(mesh), region, pitch, needed_, 1.5 * needed_);
     Thinning thinning(space, needed_);

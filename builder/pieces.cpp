@@ -9,10 +9,6 @@
 namespace prolate {
 namespace {
 
-bool before(const Vec& a, const Vec& b) {
-    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-}
-
 ColumnLattice corner_lattice(const Voxels& voxels, int parts) {
     const double step = voxels.pitch() / parts;
     return {voxels.origin().x(),          voxels.origin().y(),         step, step,
@@ -95,7 +91,7 @@ Vec Pieces::corner(const Piece& piece, size_t c) const {
 }
 
 void Pieces::add_points(Piece& piece, std::vector<Vec>& points) {
-    std::sort(points.begin(), points.end(), before);
+    std::sort(points.begin(), points.end(), lexicographically_before);
     points.erase(std::unique(points.begin(), points.end()), points.end());
     Box box;
     for (const Vec& p : points) box.add(p);
@@ -125,7 +121,7 @@ bool Pieces::between_corners(const Piece& whole, const std::array<int, 3>& at) c
             middle |= size_t{1} << a;
     const auto first = points_.begin() + static_cast<std::ptrdiff_t>(whole.first_point);
     const auto belongs = [&](size_t c) {
-        return std::binary_search(first, first + whole.point_count, corner(whole, c), before);
+        return std::binary_search(first, first + whole.point_count, corner(whole, c), lexicographically_before);
     };
     for (size_t c = 0; c < 8; ++c)
         if ((c & ~middle) == high && belongs(c) && belongs(c ^ middle)) return true;
@@ -206,7 +202,7 @@ Fit fit_pieces(const Pieces& pieces, std::span<const uint32_t> members, double m
     Checkpoints checkpoints;
     for (const uint32_t piece : members) sketch.add(pieces.points(piece)), checkpoints();
     std::vector<Vec> core(sketch.points().begin(), sketch.points().end());
-    std::sort(core.begin(), core.end(), before);
+    std::sort(core.begin(), core.end(), lexicographically_before);
     core.erase(std::unique(core.begin(), core.end()), core.end());
 
     constexpr int kRounds = 6;
@@ -230,7 +226,7 @@ Fit fit_pieces(const Pieces& pieces, std::span<const uint32_t> members, double m
         }
         if (reach <= 1 + 1e-3 || round + 1 == kRounds) break;
         std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) {
-            return a.first != b.first ? a.first > b.first : before(a.second, b.second);
+            return a.first != b.first ? a.first > b.first : lexicographically_before(a.second, b.second);
         });
         for (size_t i = 0; i < std::min<size_t>(out.size(), 12); ++i) core.push_back(out[i].second);
     }

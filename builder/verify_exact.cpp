@@ -3,7 +3,7 @@
 //
 // Rounding: corners and nodes are floats, taken as exact. Forward substitution of L y = p - c is backward stable, so
 // the computed y is wrong by less than 8 * 2^-53 |L| |L^-1| |y| (Higham, Accuracy and Stability, section 8.1);
-// kRounding asks for more than that below 1. A corner lies in a hull, a share of the ellipsoid added, if a convex
+// kGrowthRounding asks for more than that below 1. A corner lies in a hull, a share of the ellipsoid added, if a convex
 // combination of the hull's points is that near (hulls.hpp); its rounding is less than kHullRounding.
 #include "builder/verify_exact.hpp"
 
@@ -25,7 +25,7 @@
 namespace prolate {
 namespace {
 
-constexpr double kRounding = 0x1p-48, kHullRounding = 1e-10;
+constexpr double kGrowthRounding = 0x1p-48, kHullRounding = 1e-10;
 
 // Corners of a triangle from the least one on, in the triangle's order: the same for the same oriented triangle.
 using Corners = std::array<std::tuple<float, float, float>, 3>;
@@ -123,7 +123,7 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
         ellipsoids[n] = tree.ellipsoid(n);
         fits[n] = Fit(ellipsoids[n]);
-        largest[n] = 1 - kRounding * fits[n].factor.norm() * fits[n].inverse.norm();
+        largest[n] = 1 - kGrowthRounding * fits[n].factor.norm() * fits[n].inverse.norm();
         if (children.count == 0) return;
         const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
         if (has_slab(record)) slabs[n] = slab_of(tree, record);

@@ -10,14 +10,6 @@
 #include <utility>
 
 namespace prolate {
-namespace {
-
-bool before(const Vec& a, const Vec& b) {
-    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-}
-
-} // namespace
-
 Voxels::Voxels(MeshView mesh, bool closed, const Winding& winding, uint32_t resolution) {
     Box box;
     for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
@@ -139,7 +131,7 @@ void Voxels::collect_cells(MeshView mesh, bool closed, const Winding& winding) {
                     if (inside[corner_index(ci, cj, ck)]) out.push_back(origin_ + pitch_ * Vec(ci, cj, ck));
                 }
                 if (out.size() == first) continue;
-                std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(), before);
+                std::sort(out.begin() + static_cast<std::ptrdiff_t>(first), out.end(), lexicographically_before);
                 out.erase(std::unique(out.begin() + static_cast<std::ptrdiff_t>(first), out.end()), out.end());
                 cell_of_[v] = cell_count();
                 coordinates_.push_back({i, j, k});

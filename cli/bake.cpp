@@ -16,7 +16,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kBakeFooter = R"(
 The goal is --levels, --ellipsoids, a closeness (--tolerance, --distance, --clearance, --keep-holes or several) or
 --exact. The default is 3 levels. For a closeness, the tree gets as few leaves as reach it, more where the shape needs
 more: the cover then sticks out of the solid by no more than that volume and that distance. --ellipsoids with a
@@ -60,7 +60,7 @@ are relative to the manifest's folder. A bad entry, or an asset that fails, is r
 the others; the exit code is then 1. Ctrl-C keeps what is done.
 )";
 
-constexpr const char* kExamples = R"(
+constexpr const char* kBakeExamples = R"(
 
 Examples:
   prolate bake horse.obj -o horse.etree
@@ -132,7 +132,7 @@ void add_bake(CLI::App& app, Work& chosen) {
     command->add_flag("--rebake", a->rebake, "bake even if the result is already there");
     a->outputs.declare(*command);
     command->add_flag("--json", a->json, "print the figures as JSON");
-    command->footer(std::string(kFooter) + kLevelTableHelp + kExamples);
+    command->footer(std::string(kBakeFooter) + kLevelTableHelp + kBakeExamples);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

@@ -20,7 +20,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kCollideFooter = R"(
 The pose is that of B in the frame of A: translation tx,ty,tz, then optionally the rotation as a quaternion
 qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapping" is about the covers; because
 they stick out, the solids may still be separated. For exact trees, it is about their triangles, or about a body
@@ -153,7 +153,7 @@ void add_collide(CLI::App& app, Work& chosen) {
                         "stop undecided after this many tests of nodes and triangles (default: never)");
     command->add_flag("--exit-code", a->exit_code, "report the verdict by the exit code as well; see below");
     command->add_flag("--json", a->json, "print JSON");
-    command->footer(kFooter);
+    command->footer(kCollideFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

@@ -25,7 +25,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kCompareFooter = R"(
 The table has a row for each choice: 8, 16, 32 and 64 ellipsoids, 64 spheres, and the convex hull.
   outside ratio  volume of the choice outside the solid / volume of the solid
   clearance      how far it sticks out at most: metres, and percent of the diagonal of the mesh's box
@@ -140,7 +140,7 @@ void add_compare(CLI::App& app, Work& chosen) {
     command->add_option("-j,--threads", a->asset.options.threads, "0 = all cores")->capture_default_str();
     a->outputs.declare(*command);
     command->add_flag("--json", a->json, "print JSON");
-    command->footer(kFooter);
+    command->footer(kCompareFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char* kShells[] = {"bash", "zsh", "fish"};
 
-constexpr const char* kFooter = R"(
+constexpr const char* kDescribeFooter = R"(
 Examples:
   prolate completion bash >~/.local/share/bash-completion/completions/prolate
   prolate completion zsh >~/.zfunc/_prolate            # a folder of your $fpath
@@ -228,7 +228,7 @@ void add_completion(CLI::App& app, Work& chosen) {
     command->add_option("shell", *shell, "bash, zsh or fish")
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(kShells), std::end(kShells))))
         ->required();
-    command->footer(kFooter);
+    command->footer(kDescribeFooter);
     command->callback([&app, &chosen, shell] {
         chosen = [&app, shell] {
             print(*shell == "bash" ? bash(app) : *shell == "zsh" ? zsh(app) : fish(app));

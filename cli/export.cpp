@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* kFormats[] = {"csv", "json", "ply", "obj", "glb", "pov"};
 
-constexpr const char* kFooter = R"(
+constexpr const char* kExportFooter = R"(
 The cut at a level (its nodes and the leaves above it) covers the solid. With --level L, the cut at L is exported.
 Without, csv has the cut at every level, so that leaves appear once for each level; json has every node once, with
 its own level; the others have the finest cut. Nodes are named by their slots in the file, which have gaps. For an
@@ -134,7 +134,7 @@ void add_export(CLI::App& app, Work& chosen) {
         "ply, obj, glb: triangles outside the ellipsoids, so that the meshes cover (default: not for glb)");
     declare_view(*command, a->view, "pov: ");
     a->outputs.declare(*command);
-    command->footer(kFooter);
+    command->footer(kExportFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

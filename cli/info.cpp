@@ -20,7 +20,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kExamples = R"(
+constexpr const char* kInfoExamples = R"(
 
 Examples:
   prolate info horse.etree
@@ -137,7 +137,7 @@ void add_info(CLI::App& app, Work& chosen) {
     CLI::App* command = app.add_subcommand("info", "Show what an .etree file holds and how it was made");
     command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_flag("--json", a->json, "print JSON");
-    command->footer(std::string(kLevelTableHelp) + kExamples);
+    command->footer(std::string(kLevelTableHelp) + kInfoExamples);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

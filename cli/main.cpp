@@ -16,7 +16,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kMainFooter = R"(
 Examples:
   prolate bake horse.obj -o horse.etree --levels 3
   prolate verify horse.etree horse.obj
@@ -87,7 +87,7 @@ void complete(CLI::App& app) {
 Outcome<ExitCode> run(std::vector<std::string> words) {
     CLI::App app("prolate: collision detection on ellipsoid trees", "prolate");
     app.set_version_flag("--version", fmt::format("{} (.etree format {})", generator(), kFormatVersion));
-    app.footer(kFooter);
+    app.footer(kMainFooter);
     app.require_subcommand(1);
     Work chosen;
     add_bake(app, chosen);
@@ -128,6 +128,7 @@ Outcome<ExitCode> run(std::vector<std::string> words) {
 } // namespace
 } // namespace prolate::cli
 
+// NOLINTNEXTLINE(bugprone-exception-escape): what lacks the memory to tell that memory lacks may end as it does
 int main(int argc, char** argv) {
     using namespace prolate::cli;
     const std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);

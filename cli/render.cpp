@@ -21,7 +21,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kRenderFooter = R"(
 Examples:
   prolate render horse.etree horse.obj -o horse.png
   prolate render horse.etree horse.obj -o horse.png --levels 3 --view 120,30 --size 800x800
@@ -175,7 +175,7 @@ void add_render(CLI::App& app, Work& chosen) {
     command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--no-shadow", a->no_shadow, "leave out the shadow on the floor");
     a->outputs.declare(*command);
-    command->footer(kFooter);
+    command->footer(kRenderFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

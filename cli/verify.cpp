@@ -18,7 +18,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kVerifyFooter = R"(
 The proof uses only the tree's file and the mesh. Exit code 0: every level covers. 1: some level does not, or it
 could not be proved. The mesh is read as when the tree was baked, with the same unit, scale, local origin and weld
 tolerance, unless you give others. An open mesh has no certain inside, so only its triangles are proved to be
@@ -124,7 +124,7 @@ void add_verify(CLI::App& app, Work& chosen) {
     declare_mesh_options(*command, a->mesh_options, true);
     command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--json", a->json, "print JSON");
-    command->footer(kFooter);
+    command->footer(kVerifyFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

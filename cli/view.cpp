@@ -24,7 +24,7 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kFooter = R"(
+constexpr const char* kViewFooter = R"(
 Give one or two trees, each followed by the mesh that it was baked from, if you have it. The page shows the mesh
 with the tree, and how far the ellipsoids stick out of it; an exact tree brings its own mesh. The page is a single
 file that needs no network and no server, and sends nothing anywhere. It needs a browser with WebGL 2, as all have
@@ -175,7 +175,7 @@ void add_view(CLI::App& app, Work& chosen) {
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))
         ->capture_default_str();
     a->outputs.declare(*command);
-    command->footer(kFooter);
+    command->footer(kViewFooter);
     command->callback([&chosen, a] { chosen = [a] { return run(*a); }; });
 }
 

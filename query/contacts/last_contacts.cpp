@@ -7,7 +7,7 @@
 namespace prolate::query {
 namespace {
 
-constexpr double kSameNormal = 0.8; // cosine: normals of a point in two queries, if it is the same
+constexpr double kNormalOfPoint = 0.8; // cosine: normals of a point in two queries, if it is the same
 
 uint32_t points_of(const Manifold& manifold) {
     return std::min(manifold.count, kManifoldPoints);
@@ -33,14 +33,14 @@ bool LastContacts::knows(uint64_t id, const glm::dvec3& normal) const noexcept {
     bool known = false;
     for (uint32_t i = 0; i < count_; ++i) {
         const Manifold& m = last_.manifolds[i];
-        const bool alike = glm::dot(normals_[i], normal) > kSameNormal;
+        const bool alike = glm::dot(normals_[i], normal) > kNormalOfPoint;
         for (uint32_t k = 0; k < points_of(m) && alike; ++k) known = known || m.points[k].id == id;
     }
     return known;
 }
 
 void LastContacts::hand_on(Manifold& manifold) const noexcept {
-    const auto alike = [](const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z > kSameNormal; };
+    const auto alike = [](const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z > kNormalOfPoint; };
     for (uint32_t i = 0; i < manifold.count; ++i) {
         ContactPoint& p = manifold.points[i];
         for (uint32_t j = 0; j < count_; ++j) {

@@ -11,7 +11,7 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kSameNormal = 0.9;    // cosine
+constexpr double kNormalOfPatch = 0.9;    // cosine
 constexpr double kAgreeing = 1 - 1e-6; // of the weights: a mean that is as long is one of the same normals
 constexpr double kPreferKnown = 1.1;
 
@@ -30,7 +30,7 @@ Patch::Patch(const dvec3& normal) noexcept : seed_(normal) {
 }
 
 bool Patch::takes(const dvec3& normal) const noexcept {
-    return glm::dot(normal, seed_) > kSameNormal;
+    return glm::dot(normal, seed_) > kNormalOfPatch;
 }
 
 void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap,

@@ -16,7 +16,7 @@ using glm::dmat3;
 using glm::dvec3;
 
 // Steps in log(rho) are at most log(19); the loop ends when a step can improve f by less than this, relatively.
-constexpr double kLargestStep = 0.9;
+constexpr double kLargestParameterStep = 0.9;
 constexpr double kSmallestGain = 0x1p-50;
 
 } // namespace
@@ -56,7 +56,7 @@ PairResult test_pair(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double 
         const double k = rho * beta * beta;
         const double h = std::clamp(rho * rho * glm::dot(w, adj * w) / (tau * det), 0.0, k);
         const double slope = (k - h) / (alpha * alpha) + (k - h) / k;
-        const double step = std::clamp(excess / slope, -kLargestStep, kLargestStep);
+        const double step = std::clamp(excess / slope, -kLargestParameterStep, kLargestParameterStep);
         if (!(excess * step > kSmallestGain)) return {PairVerdict::unresolved, evaluations};
         (excess > 0 ? low : high) = rho;
         rho *= (1 + step) / (1 - step);

@@ -6,7 +6,7 @@
 namespace prolate::query {
 
 LatticePose lattice_pose(const RelativePose& from_to, const LatticeInfo& from, const LatticeInfo& to) noexcept {
-    constexpr double kLargestCenter = 65535 * 1.7320508075688773;
+    constexpr double kFarthestCenter = 65535 * 1.7320508075688773;
     const double step_from = step_of(from), per_step_to = steps_per_metre(to);
     const double scale = step_from * per_step_to;
     const double from_origin[] = {double(from.origin[0]), double(from.origin[1]), double(from.origin[2])};
@@ -33,7 +33,7 @@ LatticePose lattice_pose(const RelativePose& from_to, const LatticeInfo& from, c
     }
     out.offset[3] = out.offset[0];
     out.reach =
-        scale * (kLargestCenter + std::sqrt(origin_from)) + from_to.distance * per_step_to + std::sqrt(origin_to);
+        scale * (kFarthestCenter + std::sqrt(origin_from)) + from_to.distance * per_step_to + std::sqrt(origin_to);
     return out;
 }
 

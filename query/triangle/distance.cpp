@@ -11,8 +11,6 @@ namespace {
 
 using glm::dvec3;
 
-// A lower bound this near to the upper one cannot be improved by more than rounding.
-constexpr double kTight = 1 - 0x1p-40;
 // A lower bound of so many times the margin is beyond doubt: triangles that are farther apart are found to be.
 constexpr double kDoubtful = 32;
 
@@ -56,7 +54,7 @@ private:
             gap_ = gap, length_ = length;
             normal_ = pair_.leads_from_a(n) ? n : -n;
         }
-        return gap_ > kTight * std::sqrt(square_) * length_;
+        return gap_ > kTightBound * std::sqrt(square_) * length_;
     }
     // The same for points x of A and y of B.
     bool settles(const dvec3& x, const dvec3& y) {

@@ -21,6 +21,9 @@
 
 namespace prolate::query {
 
+/// A lower bound this near to the upper one cannot be improved by more than rounding.
+inline constexpr double kTightBound = 1 - 0x1p-40;
+
 struct TriangleDistance {
     double lower;          // the triangles are not nearer; 0 if they meet
     double upper;          // nor farther; infinite if a pose was not finite

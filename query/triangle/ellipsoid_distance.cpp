@@ -15,7 +15,6 @@ namespace {
 using glm::dmat3;
 using glm::dvec3;
 
-constexpr double kTight = 1 - 0x1p-40; // a lower bound this near to the upper one is good enough
 constexpr int kEdgeSteps = 32;
 
 class EllipsoidDistanceSearch {
@@ -47,7 +46,7 @@ private:
         const double least = std::min({glm::dot(n, p_[0]), glm::dot(n, p_[1]), glm::dot(n, p_[2])});
         const double gap = (least - glm::length(n * ellipsoid_.factor)) / glm::length(n);
         if (gap > gap_) gap_ = gap, normal_ = n;
-        return gap_ > kTight * distance_;
+        return gap_ > kTightBound * distance_;
     }
     // The support point in direction n.
     dvec3 farthest(const dvec3& n) const {

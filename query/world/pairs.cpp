@@ -17,7 +17,7 @@
 namespace prolate {
 namespace {
 
-constexpr uint32_t kGrain = 16; // bodies
+constexpr uint32_t kBodiesATask = 16; // bodies
 constexpr uint32_t kNoSlot = UINT32_MAX;
 constexpr uint64_t kEnd = UINT64_MAX; // above all keys
 
@@ -100,7 +100,7 @@ void World::State::reserve_pairs(uint32_t count_of_pairs) {
 uint64_t World::State::find_pairs(const Jobs& jobs) {
     for (;;) {
         Findings findings{found};
-        query::for_ranges(jobs, static_cast<uint32_t>(changed.size()), kGrain,
+        query::for_ranges(jobs, static_cast<uint32_t>(changed.size()), kBodiesATask,
                           [&](uint32_t begin, uint32_t end, uint32_t) {
                               PairCollector search(*this, findings);
                               for (uint32_t i = begin; i < end; ++i) search.look_up(changed[i]);

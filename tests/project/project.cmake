@@ -62,8 +62,8 @@ script_test(project.readme readme.cmake -D README=${PROJECT_SOURCE_DIR}/README.m
 script_test(project.readme_selftest readme_selftest.cmake -D EXAMPLES=${PROJECT_SOURCE_DIR}/examples
   -D WORK=${scratch}/readme)
 
-# The package. Not in sanitized builds: a user's build has no sanitizer, and the libraries are the same.
-if(PROLATE_BUILD_BUILDER AND NOT PROLATE_SANITIZE)
+# The package.
+if(PROLATE_BUILD_BUILDER)
   foreach(how installed subdirectory query_only)
     script_test(package.${how} consumer.cmake -D HOW=${how} -D ROOT=${PROJECT_SOURCE_DIR} -D BUILD=${PROJECT_BINARY_DIR}
       -D WORK=${scratch}/package -D CXX=${CMAKE_CXX_COMPILER} PROPERTIES LABELS package)
