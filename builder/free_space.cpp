@@ -8,7 +8,7 @@
 namespace prolate {
 namespace {
 
-constexpr int kBlock = 16;          // nodes of a task, along each axis
+constexpr int kBlock = 16;                  // nodes of a task, along each axis
 constexpr double kDistanceRounding = 1e-12; // of the largest coordinate: of measured distances
 constexpr float kRoundingOfFloat = 1 - 0x1p-22f;
 

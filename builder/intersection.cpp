@@ -114,7 +114,7 @@ private:
         Vec chords = Vec::Zero(), about_foot = Vec::Zero(); // sum of q - p over the pieces; first moment
         Vec p, q, entry, exit;
         size_t entry_edge = kNoEdge, exit_edge = kNoEdge; // of an entry without its exit, of an exit without its entry
-        bool whole = true;                            // nothing of the boundary is in the ball
+        bool whole = true;                                // nothing of the boundary is in the ball
         for (size_t i = 0; i < 3; ++i) {
             const Corner &from = *corners[i], &to = *corners[(i + 1) % 3];
             if (from.inside() && to.inside())

@@ -15,11 +15,11 @@
 namespace prolate {
 namespace {
 
-constexpr double kStepsOfRadius = 6; // in the ball's radius, ...
-constexpr double kMostSteps = 96;    // ... but not more than these in the box's longest side
-constexpr double kRegionMargin = 0.15;     // of that side: how far around the mesh the lattice reaches, besides the ball
-constexpr double kCoordinateRounding = 1e-12;  // of the largest coordinate
-constexpr int kIterations = 60;      // of a bisection
+constexpr double kStepsOfRadius = 6;   // in the ball's radius, ...
+constexpr double kMostSteps = 96;      // ... but not more than these in the box's longest side
+constexpr double kRegionMargin = 0.15; // of that side: how far around the mesh the lattice reaches, besides the ball
+constexpr double kCoordinateRounding = 1e-12; // of the largest coordinate
+constexpr int kIterations = 60;               // of a bisection
 
 // Which of a node's neighbours are neighbours of each other, as bits.
 struct Adjacency {

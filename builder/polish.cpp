@@ -13,10 +13,10 @@
 namespace prolate {
 namespace {
 
-constexpr double kHeld = 1 + 1e-7;    // squared radial coordinate up to which a point counts as held
-constexpr double kNearlyHeld = 1.005; // scale of an ellipsoid that holds a piece well enough not to cut it
-constexpr double kNeighbourMargin = 1.2;       // ellipsoids may grow so much before neighbours are looked for again
-constexpr int kNeighbourInterval = 4; // sweeps
+constexpr double kHeld = 1 + 1e-7;       // squared radial coordinate up to which a point counts as held
+constexpr double kNearlyHeld = 1.005;    // scale of an ellipsoid that holds a piece well enough not to cut it
+constexpr double kNeighbourMargin = 1.2; // ellipsoids may grow so much before neighbours are looked for again
+constexpr int kNeighbourInterval = 4;    // sweeps
 constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
 constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
 constexpr double kAlmostCapped = 0.9;                 // of the largest axis ratio of steps

@@ -11,7 +11,7 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kNormalOfPatch = 0.9;    // cosine
+constexpr double kNormalOfPatch = 0.9; // cosine
 constexpr double kAgreeing = 1 - 1e-6; // of the weights: a mean that is as long is one of the same normals
 constexpr double kPreferKnown = 1.1;
 

@@ -11,7 +11,7 @@ namespace prolate {
 namespace {
 
 constexpr uint32_t kMostBodies = uint32_t{1} << 30; // the tree's nodes, twice as many, have 32-bit numbers
-constexpr uint32_t kBoxesATask = 64;                     // boxes
+constexpr uint32_t kBoxesATask = 64;                // boxes
 
 constexpr Error kOutOfMemory{ErrorCode::out_of_memory, "the world's memory resource gave no more", 0};
 constexpr Error kBadId{ErrorCode::bad_id, "no body has this id, or has it any more", 0};
@@ -176,10 +176,11 @@ Result<void> World::move(std::span<const BodyId> ids, std::span<const Pose> pose
         s.for_parts(ids[i].index, poses[i], [&](uint32_t index, const Pose& pose) {
             s.moves.push_back({.index = index, .pose = pose, .placement = {}});
         });
-    query::for_ranges(jobs, static_cast<uint32_t>(s.moves.size()), kBoxesATask, [&](uint32_t begin, uint32_t end, uint32_t) {
-        for (uint32_t i = begin; i < end; ++i)
-            s.moves[i].placement = s.place(s.entries[s.moves[i].index], s.moves[i].pose);
-    });
+    query::for_ranges(jobs, static_cast<uint32_t>(s.moves.size()), kBoxesATask,
+                      [&](uint32_t begin, uint32_t end, uint32_t) {
+                          for (uint32_t i = begin; i < end; ++i)
+                              s.moves[i].placement = s.place(s.entries[s.moves[i].index], s.moves[i].pose);
+                      });
     for (const State::Move& to : s.moves) s.move(to);
     return {};
 }
