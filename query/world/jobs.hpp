@@ -32,6 +32,7 @@ template <class Work> void for_ranges(const Jobs& jobs, uint32_t count, uint32_t
 
 inline constexpr uint32_t kQueryGrain = 8; ///< queries in a range: each takes a fraction of a microsecond to some
 
+inline constexpr Error kSpanTooShort{ErrorCode::bad_options, "a span is shorter than what it is for", 0};
 inline constexpr Error kTooFewContexts{ErrorCode::bad_options, "each worker needs a context", 0};
 inline bool has_context_each(const Jobs& jobs, std::span<const QueryContext> contexts) noexcept {
     return contexts.size() >= std::max(1u, jobs.workers);

@@ -17,11 +17,10 @@ namespace {
 
 using glm::dvec3;
 
-constexpr Error kTooFew{ErrorCode::bad_options, "a span is shorter than what it is for", 0};
 constexpr uint32_t kGrain = 2; // questions, each to many bodies
 
 Result<void> check(size_t questions, size_t room, const Workers& workers) {
-    if (room < questions || questions > UINT32_MAX) return kTooFew;
+    if (room < questions || questions > UINT32_MAX) return query::kSpanTooShort;
     if (!query::has_context_each(workers.jobs, workers.contexts)) return query::kTooFewContexts;
     return {};
 }

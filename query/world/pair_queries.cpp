@@ -11,8 +11,6 @@
 namespace prolate {
 namespace {
 
-constexpr Error kTooFew{ErrorCode::bad_options, "a span is shorter than what it is for", 0};
-
 // The caches of pairs: as many as there are slots, or none.
 template <class Cache> struct Caches {
     std::span<OfPair<Cache>> all;
@@ -28,12 +26,12 @@ template <class Cache> struct Caches {
 // What every query of pairs checks. `slots`: for how many of these there is room.
 Result<void> check(const World& world, std::span<const BodyPair> pairs, size_t room, size_t slots,
                    const Workers& workers) {
-    if (room < pairs.size() || pairs.size() > UINT32_MAX) return kTooFew;
+    if (room < pairs.size() || pairs.size() > UINT32_MAX) return query::kSpanTooShort;
     if (!query::has_context_each(workers.jobs, workers.contexts)) return query::kTooFewContexts;
     for (size_t i = 0; i < pairs.size(); ++i) {
         if (world.find(pairs[i].a) == nullptr || world.find(pairs[i].b) == nullptr)
             return Error{ErrorCode::bad_id, "a body of this pair has been removed", i};
-        if (pairs[i].slot >= slots) return kTooFew;
+        if (pairs[i].slot >= slots) return query::kSpanTooShort;
     }
     return {};
 }
@@ -95,7 +93,7 @@ Result<void> sweep(const World& world, std::span<const BodyPair> pairs, std::spa
     if (const auto good = check(world, pairs, out.size(), SIZE_MAX, workers); !good) return good;
     const auto has_motion = [&](BodyId id) { return id.index < motions.size(); };
     if (!std::ranges::all_of(pairs, [&](const BodyPair& p) { return has_motion(p.a) && has_motion(p.b); }))
-        return kTooFew;
+        return query::kSpanTooShort;
     for_pairs(world, pairs, workers,
               [&](const BodyPair& pair, const Body& a, const Body& b, Scratch context, uint32_t i) {
                   out[i] = query::sweep(a, motions[pair.a.index], b, motions[pair.b.index], context, options);
@@ -123,7 +121,7 @@ Result<void> contacts(const World& world, std::span<const BodyPair> pairs, std::
 Result<size_t> contact_events(const World& world, std::span<PairContacts> records,
                               std::span<ContactEvent> out) noexcept {
     const auto ended = world.ended_pairs(), listed = world.pairs();
-    if (records.size() < world.slot_count() || out.size() < ended.size() + listed.size()) return kTooFew;
+    if (records.size() < world.slot_count() || out.size() < ended.size() + listed.size()) return query::kSpanTooShort;
     size_t count = 0;
     const auto add = [&](const BodyPair& pair, ContactEvent::Kind kind) {
         out[count++] = {.a = pair.a, .b = pair.b, .slot = pair.slot, .kind = kind};
