@@ -7,26 +7,35 @@
 
 namespace prolate {
 
+/// How a set of ellipsoids is looked for.
+struct Search {
+    int starts;         ///< tried for each set; the best ones go on
+    int iterations;     ///< of the descent from each start
+    int cycles;         ///< shorter descents afterwards, each from the best state so far, that relocate again
+    int finalists;      ///< that are polished: which one is the tightest is only known then
+    int sweeps;         ///< of the polish
+    double polish_step; ///< its first one, relative to the radii
+};
+
 struct Effort {
-    uint32_t resolution;       ///< voxels along the longest side, at least
-    int starts;                ///< tried for each set; the best one goes on
-    int iterations;            ///< of the descent from each start
-    int cycles;                ///< shorter descents afterwards, each from the best state so far, that relocate again
-    int sweeps;                ///< of the polish
+    uint32_t resolution; ///< voxels along the longest side, at least
+    Search search;
+    Search middle;             ///< the same for sets of 17 to 64 ellipsoids, for which one long descent beats several
     double distance_tolerance; ///< of measured distances: of the largest one, in diagonals
     uint32_t distance_samples; ///< for their mean and percentile
 };
 
 constexpr Effort effort_of(Quality quality) {
+    constexpr Search fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01}, best{3, 1500, 2, 1, 12, 0.01};
     switch (quality) {
     case Quality::fast:
-        return {64, 1, 300, 0, 4, 1e-3, 2000};
+        return {64, fast, fast, 1e-3, 2000};
     case Quality::normal:
-        return {96, 2, 500, 0, 8, 1e-4, 8000};
+        return {96, normal, normal, 1e-4, 8000};
     case Quality::best:
         break;
     }
-    return {192, 3, 1500, 2, 12, 1e-4, 32000};
+    return {192, best, {3, 4000, 0, 2, 20, 0.05}, 1e-4, 32000};
 }
 
 } // namespace prolate

@@ -79,30 +79,44 @@ FlatSet FlatSetMaker::single() const {
 }
 
 FlatSet FlatSetMaker::make(uint32_t count, const FlatSet* above, const std::function<void(double)>& progress) {
-    return settle(approach(count, above, progress), count);
+    FlatSet best;
+    for (std::vector<Fit>& fits : approach(count, above, progress)) {
+        FlatSet set = settle(std::move(fits), count);
+        if (!best.parts.empty()) follow_cuts(best, solid_.pieces);
+        if (best.parts.empty() || set.outside < best.outside) best = std::move(set);
+    }
+    return best;
 }
 
-// A set that all but covers: the best one that the descents found.
-std::vector<Fit> FlatSetMaker::approach(uint32_t count, const FlatSet* above,
-                                        const std::function<void(double)>& progress) const {
-    int starts = effort_.starts * std::clamp(static_cast<int>(kManyStarts / count), 1, kMostStarts);
+const Search& FlatSetMaker::search_for(size_t count) const {
+    return count > kFew && count <= kMergeLimit ? effort_.middle : effort_.search;
+}
+
+// Sets that all but cover: the best ones that the descents found.
+std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const FlatSet* above,
+                                                     const std::function<void(double)>& progress) const {
+    const Search& search = search_for(count);
+    int starts = search.starts * std::clamp(static_cast<int>(kManyStarts / count), 1, kMostStarts);
     if (above && above->parts.size() == 1) above = nullptr;
     if (above) starts = std::max(starts, 2); // the last one knows of no set above
-    const int rounds = starts + effort_.cycles;
+    const int rounds = starts + search.cycles;
     const std::vector<Vec> points = points_for(count);
-    Start best;
-    double least = HUGE_VAL; // error
+    std::vector<Start> best; // best first
+    std::vector<double> least;
     for (int round = 0; round < rounds; ++round) {
         const bool fresh = round < starts, alone = round == starts - 1;
-        Start now = fresh ? start(count, alone ? nullptr : above, round, points) : best;
-        descend_from(now, points, fresh ? effort_.iterations : effort_.iterations / 2, fresh ? 1 : kReheat, round,
+        Start now = fresh ? start(count, alone ? nullptr : above, round, points) : best.front();
+        descend_from(now, points, fresh ? search.iterations : search.iterations / 2, fresh ? 1 : kReheat, round,
                      [&](double done) { progress(0.9 * (round + done) / rounds); });
         double error = approximate_error(now.fits);
         if (above && now.family.empty()) error *= kMostLoss;
-        if (!(error < least || best.fits.empty())) continue;
-        best = std::move(now), least = error;
+        const auto place = std::ranges::upper_bound(least, error) - least.begin();
+        best.insert(best.begin() + place, std::move(now)), least.insert(least.begin() + place, error);
+        if (best.size() > static_cast<size_t>(search.finalists)) best.pop_back(), least.pop_back();
     }
-    return best.fits;
+    std::vector<std::vector<Fit>> out;
+    for (Start& one : best) out.push_back(std::move(one.fits));
+    return out;
 }
 
 FlatSet FlatSetMaker::settle(std::vector<Fit> fits, size_t count) {
@@ -251,7 +265,8 @@ void FlatSetMaker::descend_from(Start& start, std::span<const Vec> points, int i
 std::vector<uint32_t> FlatSetMaker::polish_set(std::vector<Fit>& fits) const {
     const PolishOptions options{.objective = objective(fits.size()),
                                 .primitive = options_.primitive,
-                                .sweeps = effort_.sweeps,
+                                .sweeps = search_for(fits.size()).sweeps,
+                                .first_step = search_for(fits.size()).polish_step,
                                 .directions = kPolishDirections,
                                 .min_radius = min_radius_,
                                 .outside = solid_.outside,

@@ -82,7 +82,9 @@ private:
         std::vector<uint32_t> family; // of each: the part of the set above; empty if there is none
         std::vector<uint32_t> owner;  // of each point: an ellipsoid near it
     };
-    std::vector<Fit> approach(uint32_t count, const FlatSet* above, const std::function<void(double)>& progress) const;
+    std::vector<std::vector<Fit>> approach(uint32_t count, const FlatSet* above,
+                                           const std::function<void(double)>& progress) const;
+    const Search& search_for(size_t count) const;
     FlatSet settle(std::vector<Fit> fits, size_t count);
     Start start(uint32_t count, const FlatSet* above, int number, std::span<const Vec> points) const;
     void descend_from(Start& start, std::span<const Vec> points, int iterations, double kappa, int number,

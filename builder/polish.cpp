@@ -17,9 +17,9 @@ constexpr double kHeld = 1 + 1e-7;       // squared radial coordinate up to whic
 constexpr double kNearlyHeld = 1.005;    // scale of an ellipsoid that holds a piece well enough not to cut it
 constexpr double kNeighbourMargin = 1.2; // ellipsoids may grow so much before neighbours are looked for again
 constexpr int kNeighbourInterval = 4;    // sweeps
-constexpr double kFirstStep = 0.01, kStepDecay = 0.8; // relative to the radii; falls with the square
-constexpr double kFirstReward = 0.1;                  // for volume inside the solid that no other covers; falls to 0
-constexpr double kAlmostCapped = 0.9;                 // of the largest axis ratio of steps
+constexpr double kStepDecay = 0.8;       // of the step's square root, over all sweeps
+constexpr double kFirstReward = 0.1;     // for volume inside the solid that no other covers; falls to 0
+constexpr double kAlmostCapped = 0.9;    // of the largest axis ratio of steps
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -100,7 +100,7 @@ public:
         for (int sweep = 0; sweep < sweeps; ++sweep) {
             if (sweep > 0 && sweep % kNeighbourInterval == 0) find_candidates();
             const double t = static_cast<double>(sweep) / std::max(1, sweeps - 1), left = 1 - kStepDecay * t;
-            step_ = kFirstStep * left * left;
+            step_ = options_.first_step * left * left;
             reward_ = kFirstReward * std::max(0.0, 1 - 2 * t);
             const Mat rotation = random_rotation(random_);
             for (size_t d = 0; d < directions_.size(); ++d) rotated_[d] = rotation * directions_[d];
@@ -327,7 +327,7 @@ private:
     std::vector<uint16_t> holders_;                 // of each piece
     std::vector<uint32_t> needed_by_;               // of each piece that nobody held at first: who took it
     std::vector<Fit> best_;
-    double best_error_ = HUGE_VAL, step_ = kFirstStep, reward_ = 0;
+    double best_error_ = HUGE_VAL, step_ = 0, reward_ = 0;
 };
 
 // What is as thin as steps may make it, though its pieces may be thinner: the least ellipsoid around them instead.

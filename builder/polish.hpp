@@ -16,7 +16,8 @@ struct PolishOptions {
     Objective objective;
     Primitive primitive;
     int sweeps;
-    int directions; ///< samples of an ellipsoid's border a step
+    double first_step; ///< relative to the radii; later ones are smaller
+    int directions;    ///< samples of an ellipsoid's border a step
     double min_radius;
     /// E_vol of an ellipsoid and its gradient, in closed form (the analytic method); empty: sampled on the distance
     /// field (the voxel method). What the other ellipsoids hide of it is sampled either way.

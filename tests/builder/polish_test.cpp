@@ -156,6 +156,7 @@ PolishOptions options_for(const Scene& scene, Primitive primitive, int sweeps = 
     return {{0.5, 0.5, 0.2},
             primitive,
             sweeps,
+            0.01,
             128,
             kMinRadius,
             {},
