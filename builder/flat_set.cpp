@@ -115,6 +115,7 @@ std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const FlatS
         if (best.size() > static_cast<size_t>(search.finalists)) best.pop_back(), least.pop_back();
     }
     std::vector<std::vector<Fit>> out;
+    out.reserve(best.size());
     for (Start& one : best) out.push_back(std::move(one.fits));
     return out;
 }
