@@ -35,10 +35,6 @@ DistanceResult run(query::DistanceSearch& search, const Pose& pose_a, const Meet
     return out;
 }
 
-} // namespace
-
-namespace {
-
 DistanceResult of_cores(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b, Scratch context,
                         const DistanceOptions& options, DistanceCache* cache) {
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
@@ -78,7 +74,8 @@ DistanceResult of_rounded(const TreeView& a, const Pose& pose_a, const TreeView&
     if (out.lower <= radii * (1 + 0x1p-20)) {
         const CollideResult met =
             collide(a, pose_a, b, pose_b, context,
-                    {.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests())});
+                    {.max_level = options.max_level,
+                     .max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests())});
         query::add(met.stats, out.stats);
         out.verdict = met.verdict;
     }
