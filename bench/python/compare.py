@@ -7,8 +7,9 @@ diagonal) or *touching*. Each package is asked pose by pose, from Python, with i
 the median over the poses of the least of several turns, and the turns go round the packages. One that takes more than
 50 ms is asked at three poses only. "single, C++" is the call that prolate's single call makes, without Python; "batch"
 is prolate asked for 2,000 poses by one call. Ratios are to prolate's single call. "import" is how much more
-processor time a fresh Python takes that imports a package (with numpy, where that brings it), median of 11. Verdicts and distances are compared with coal.distance, which is exact for meshes; poses nearer than 1e-6
-of the diagonal are not judged.
+processor time a fresh Python takes that imports a package (with numpy, where that brings it), median of 11. Verdicts
+and distances are compared with coal.distance, which is exact for meshes; poses nearer than 1e-6 of the diagonal are not
+judged.
 
 Meshes are surfaces to Coal and FCL, so poses with one body inside the other are left out.
 """

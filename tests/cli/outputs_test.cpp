@@ -325,14 +325,8 @@ TEST_F(CliOutputs, AClosedPipeForMessagesKillsNothing) {
 
 // ---- ordinary errors ----
 
-#if defined(__SANITIZE_ADDRESS__)
+#ifdef PROLATE_SANITIZED
 constexpr bool kSanitized = true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
 #else
 constexpr bool kSanitized = false;
 #endif

@@ -27,12 +27,7 @@ using reference::Vector;
 using scenes::Point;
 using scenes::Random;
 
-#ifdef __has_feature
-#if __has_feature(address_sanitizer)
-#define PROLATE_HUNT_SANITIZED
-#endif
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(PROLATE_HUNT_SANITIZED)
+#ifdef PROLATE_SANITIZED
 inline constexpr uint64_t kPairs = 50'000; // the sanitizers look for errors of another kind
 #else
 inline constexpr uint64_t kPairs = 1'000'000;

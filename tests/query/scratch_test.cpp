@@ -139,7 +139,7 @@ TEST(Scratch, WithLessNothingIsSaid) {
 
 // On a stack of our own, whose bytes tell afterwards how far it was used.
 TEST(Scratch, QueriesRunOnAFibresStack) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(__OPTIMIZE__)
+#if defined(PROLATE_SANITIZED) || !defined(__OPTIMIZE__)
     GTEST_SKIP() << "frames are larger there";
 #endif
     constexpr size_t kFibre = size_t{64} * 1024, kStack = 2 * kFibre, kPage = 4096;

@@ -27,14 +27,8 @@ using query::PairVerdict;
 using scenes::Point;
 using scenes::Random;
 
-#if defined(__SANITIZE_ADDRESS__)
+#ifdef PROLATE_SANITIZED
 constexpr uint32_t kShare = 20; // the sanitizers look for errors of another kind
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr uint32_t kShare = 20;
-#else
-constexpr uint32_t kShare = 1;
-#endif
 #else
 constexpr uint32_t kShare = 1;
 #endif
