@@ -20,18 +20,18 @@ struct Search {
 struct Effort {
     uint32_t resolution; ///< voxels along the longest side, at least
     Search search;
-    Search middle;             ///< the same for sets of 17 to 64 ellipsoids, for which one long descent beats several
+    Search middle; ///< a second search for sets of 17 to 64 ellipsoids, which long descents often suit; if starts > 0
     double distance_tolerance; ///< of measured distances: of the largest one, in diagonals
     uint32_t distance_samples; ///< for their mean and percentile
 };
 
 constexpr Effort effort_of(Quality quality) {
-    constexpr Search fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01}, best{3, 1500, 2, 1, 12, 0.01};
+    constexpr Search none{}, fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01}, best{3, 1500, 2, 1, 12, 0.01};
     switch (quality) {
     case Quality::fast:
-        return {64, fast, fast, 1e-3, 2000};
+        return {64, fast, none, 1e-3, 2000};
     case Quality::normal:
-        return {96, normal, normal, 1e-4, 8000};
+        return {96, normal, none, 1e-4, 8000};
     case Quality::best:
         break;
     }

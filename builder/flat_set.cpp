@@ -73,29 +73,30 @@ FlatSet FlatSetMaker::single() const {
     std::vector<Fit> fits{fit_pieces(solid_.pieces, all, min_radius_)};
     if (options_.primitive == Primitive::sphere) {
         fits[0] = as_primitive(fits[0], Primitive::sphere);
-        polish_set(fits);
+        polish_set(fits, effort_.search);
     }
     return {{{fits[0], std::move(all)}}, outside_of(fits), solid_.pieces.size()};
 }
 
 FlatSet FlatSetMaker::make(uint32_t count, const FlatSet* above, const std::function<void(double)>& progress) {
     FlatSet best;
-    for (std::vector<Fit>& fits : approach(count, above, progress)) {
-        FlatSet set = settle(std::move(fits), count);
-        if (!best.parts.empty()) follow_cuts(best, solid_.pieces);
-        if (best.parts.empty() || set.outside < best.outside) best = std::move(set);
-    }
+    const auto look = [&](const Search& search, double begin, double end) {
+        const auto report = [&](double done) { progress(begin + done * (end - begin)); };
+        for (std::vector<Fit>& fits : approach(count, search, above, report)) {
+            FlatSet set = settle(std::move(fits), count, search);
+            if (!best.parts.empty()) follow_cuts(best, solid_.pieces);
+            if (best.parts.empty() || set.outside < best.outside) best = std::move(set);
+        }
+    };
+    const bool twice = effort_.middle.starts > 0 && count > kFew && count <= kMergeLimit;
+    look(effort_.search, 0, twice ? 0.3 : 1);
+    if (twice) look(effort_.middle, 0.3, 1);
     return best;
 }
 
-const Search& FlatSetMaker::search_for(size_t count) const {
-    return count > kFew && count <= kMergeLimit ? effort_.middle : effort_.search;
-}
-
 // Sets that all but cover: the best ones that the descents found.
-std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const FlatSet* above,
+std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const Search& search, const FlatSet* above,
                                                      const std::function<void(double)>& progress) const {
-    const Search& search = search_for(count);
     int starts = search.starts * std::clamp(static_cast<int>(kManyStarts / count), 1, kMostStarts);
     if (above && above->parts.size() == 1) above = nullptr;
     if (above) starts = std::max(starts, 2); // the last one knows of no set above
@@ -120,9 +121,9 @@ std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const FlatS
     return out;
 }
 
-FlatSet FlatSetMaker::settle(std::vector<Fit> fits, size_t count) {
+FlatSet FlatSetMaker::settle(std::vector<Fit> fits, size_t count, const Search& search) {
     refine_seams(solid_.pieces, fits);
-    const std::vector<uint32_t> owner = polish_set(fits);
+    const std::vector<uint32_t> owner = polish_set(fits, search);
     FlatSet set;
     set.piece_count = solid_.pieces.size();
     for (const Fit& fit : fits) set.parts.push_back({fit, {}});
@@ -263,11 +264,11 @@ void FlatSetMaker::descend_from(Start& start, std::span<const Vec> points, int i
     descend(start.fits, solid_.field, points, start.owner, options);
 }
 
-std::vector<uint32_t> FlatSetMaker::polish_set(std::vector<Fit>& fits) const {
+std::vector<uint32_t> FlatSetMaker::polish_set(std::vector<Fit>& fits, const Search& search) const {
     const PolishOptions options{.objective = objective(fits.size()),
                                 .primitive = options_.primitive,
-                                .sweeps = search_for(fits.size()).sweeps,
-                                .first_step = search_for(fits.size()).polish_step,
+                                .sweeps = search.sweeps,
+                                .first_step = search.polish_step,
                                 .directions = kPolishDirections,
                                 .min_radius = min_radius_,
                                 .outside = solid_.outside,

@@ -82,16 +82,15 @@ private:
         std::vector<uint32_t> family; // of each: the part of the set above; empty if there is none
         std::vector<uint32_t> owner;  // of each point: an ellipsoid near it
     };
-    std::vector<std::vector<Fit>> approach(uint32_t count, const FlatSet* above,
+    std::vector<std::vector<Fit>> approach(uint32_t count, const Search& search, const FlatSet* above,
                                            const std::function<void(double)>& progress) const;
-    const Search& search_for(size_t count) const;
-    FlatSet settle(std::vector<Fit> fits, size_t count);
+    FlatSet settle(std::vector<Fit> fits, size_t count, const Search& search);
     Start start(uint32_t count, const FlatSet* above, int number, std::span<const Vec> points) const;
     void descend_from(Start& start, std::span<const Vec> points, int iterations, double kappa, int number,
                       const std::function<void(double)>& progress) const;
     std::vector<std::vector<uint32_t>> share_cells(const FlatSet* above) const;
     std::vector<Vec> points_for(uint32_t count) const;
-    std::vector<uint32_t> polish_set(std::vector<Fit>& fits) const;
+    std::vector<uint32_t> polish_set(std::vector<Fit>& fits, const Search& search) const;
     void halve(std::vector<Part>& parts, size_t count, double worth) const;
     Fit part_of(const Fit& whole, std::span<const uint32_t> pieces) const;
     CoverVolume measure(std::span<const Fit> fits) const;
