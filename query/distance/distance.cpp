@@ -1,10 +1,10 @@
 // distance(): the query around the traversal (search.cpp). Bodies are taken in their canonical order, and a
 // DistanceCache names the leaves to be looked at first.
+#include "query/distance/rounded.hpp"
 #include "query/distance/search.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace prolate {
 namespace {
@@ -70,24 +70,8 @@ DistanceResult of_rounded(const TreeView& a, const Pose& pose_a, const TreeView&
         if (closer.lower >= out.lower && closer.upper <= out.upper) out = closer;
         query::add(before, out.stats);
     }
-    if (out.verdict == Verdict::overlapping) return out;
-    if (out.lower <= radii * (1 + 0x1p-20)) {
-        const CollideResult met =
-            collide(a, pose_a, b, pose_b, context,
-                    {.max_level = options.max_level,
-                     .max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests())});
-        query::add(met.stats, out.stats);
-        out.verdict = met.verdict;
-    }
-    out.lower = std::max(0.0, out.lower * (1 - 0x1p-51) - radii);
-    out.upper = std::max(0.0, out.upper * (1 + 0x1p-51) - radii);
-    if (out.verdict == Verdict::overlapping) out.lower = 0;
-    if (out.verdict == Verdict::separated) out.lower = std::max(out.lower, std::numeric_limits<double>::min());
-    if (out.verdict == Verdict::separated) out.upper = std::max(out.upper, out.lower);
-    const auto moved = [&](const Vec3& p, float by) {
-        return Vec3{p.x + by * out.normal.x, p.y + by * out.normal.y, p.z + by * out.normal.z};
-    };
-    out.point_a = moved(out.point_a, a.radius()), out.point_b = moved(out.point_b, -b.radius());
+    query::round_distance(out, a.radius(), b.radius(), options,
+                          [&](const QueryOptions& o) { return collide(a, pose_a, b, pose_b, context, o); });
     return out;
 }
 

@@ -10,6 +10,7 @@
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
 #include "query/contacts/pair_contacts.hpp"
+#include "query/distance/rounded.hpp"
 #include "query/half_space/lowest.hpp"
 #include "query/half_space/search.hpp"
 #include "query/node/scratch.hpp"
@@ -19,7 +20,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace prolate {
 namespace query {
@@ -157,22 +157,8 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
     DistanceOptions limits = options;
     limits.max_distance = query::sound_length(options.max_distance) + radius;
     DistanceResult out = of_core(tree, pose, half_space, context, limits);
-    if (out.verdict == Verdict::overlapping) return out;
-    if (out.lower <= radius * (1 + 0x1p-20)) {
-        const OverlapResult met =
-            overlap(tree, pose, half_space, context,
-                    {.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests())});
-        query::add(met.stats, out.stats);
-        out.verdict = met.verdict;
-    }
-    out.lower = std::max(0.0, out.lower * (1 - 0x1p-51) - radius);
-    out.upper = std::max(0.0, out.upper * (1 + 0x1p-51) - radius);
-    if (out.verdict == Verdict::overlapping) out.lower = 0;
-    if (out.verdict == Verdict::separated) out.lower = std::max(out.lower, std::numeric_limits<double>::min());
-    if (out.verdict == Verdict::separated) out.upper = std::max(out.upper, out.lower);
-    const auto by = static_cast<float>(radius);
-    out.point_a = {out.point_a.x + by * out.normal.x, out.point_a.y + by * out.normal.y,
-                   out.point_a.z + by * out.normal.z};
+    query::round_distance(out, tree.radius(), 0, options,
+                          [&](const QueryOptions& o) { return overlap(tree, pose, half_space, context, o); });
     return out;
 }
 

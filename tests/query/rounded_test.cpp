@@ -269,6 +269,38 @@ TEST(Rounded, WhateverIsRoundedAnswersAsItsCoreWithAMargin) {
     EXPECT_GT(meeting, 80u);
 }
 
+TEST(Rounded, DistancesLookNoDeeperThanVerdicts) {
+    Random random(12);
+    const auto torus = scenes::exact_tree(shapes::torus(1, 0.3f, 24, 12));
+    const TreeView tree = *TreeView::open(torus.bytes)->rounded(0.05f);
+    const auto context = std::make_unique<QueryContext>();
+    const HalfSpace ground{{0, 0, 1}, 0};
+    uint32_t not_separated = 0, seldom = 0;
+    // Apart by the bound on the distance, or because the coarse verdict says so.
+    const auto looked_deeper = [](const DistanceResult& d) {
+        return d.verdict == Verdict::separated && d.lower <= std::numeric_limits<double>::min();
+    };
+    for (int i = 0; i < 600; ++i) {
+        const Pose p = scenes::pose_at(random, 0.5), q = scenes::pose_at(random, random.in(1.5, 3));
+        for (const uint32_t level : {0u, 1u}) {
+            const QueryOptions coarse{.max_level = level};
+            const DistanceOptions as_coarse{.max_level = level};
+            if (collide(tree, p, tree, q, *context, coarse).verdict != Verdict::separated) {
+                ++not_separated;
+                seldom += collide(tree, p, tree, q, *context).verdict == Verdict::separated;
+                EXPECT_FALSE(looked_deeper(distance(tree, p, tree, q, *context, as_coarse)));
+            }
+            if (overlap(tree, q, ground, *context, coarse).verdict != Verdict::separated) {
+                ++not_separated;
+                seldom += overlap(tree, q, ground, *context).verdict == Verdict::separated;
+                EXPECT_FALSE(looked_deeper(distance(tree, q, ground, *context, as_coarse)));
+            }
+        }
+    }
+    EXPECT_GT(not_separated, 100u);
+    EXPECT_GT(seldom, 20u); // where a deeper look would have said more
+}
+
 TEST(Rounded, WorldsOfBallsAndCapsules) {
     Random random(5);
     World world = *World::create();
