@@ -35,7 +35,7 @@ set(query/inside_knows "simd ellipsoid triangle node")
 foreach(folder collide distance sweep raycast shapes points)
   set(query/${folder}_knows "${query_geometry}")
 endforeach()
-set(query/half_space_knows "${query_geometry} collide contacts shapes sweep")
+set(query/half_space_knows "${query_geometry} collide contacts distance shapes sweep")
 set(query/contacts_knows "${query_geometry} collide")
 set(query/world_knows "${query_geometry} collide contacts distance sweep raycast shapes")
 
