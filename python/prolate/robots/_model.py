@@ -1,8 +1,8 @@
 """What a robot description says, whichever format it came in: links, joints, and geometries with their frames.
 
-All lengths are metres, angles radians, masses kilograms. Poses are 4x4 matrices of float64: a pose of a frame in its parent
-maps points of the frame to points of the parent. Everything here is plain data and immutable; a reader makes it, and
-covers, writers and checks only read it.
+All lengths are metres, angles radians, masses kilograms. Poses are 4x4 matrices of float64: a pose of a frame in its
+parent maps points of the frame to points of the parent. Everything here is plain data and immutable; a reader makes it,
+and covers, writers and checks only read it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Where:
 class Note:
     """Something that the reader, the bake or a writer wants to be known.
 
-    ``kind`` is ``"error"`` (a link is missing something; the others go on), ``"warning"`` (read, but surely not meant so)
-    or ``"info"`` (what was done, where other loaders do otherwise).
+    ``kind`` is ``"error"`` (a link is missing something; the others go on), ``"warning"`` (read, but surely not meant
+    so) or ``"info"`` (what was done, where other loaders do otherwise).
     """
 
     kind: Literal["error", "warning", "info"]
@@ -118,7 +118,7 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Inertial:
-    """Mass, and the inertia tensor (3, 3) about the centre of mass in the axes of ``pose``, whose origin that centre is."""
+    """Mass, and the inertia tensor (3, 3) about the centre of mass, which is the origin of ``pose``, in its axes."""
 
     mass: float
     inertia: Matrix
@@ -160,8 +160,8 @@ class Joint:
 
     The child's frame in the parent's is ``origin @ translate(anchor) @ motion(q - zero) @ translate(-anchor)``, where
     the motion is along or about ``axis``, a unit vector in the frame of ``origin``. URDF and SDF have ``anchor`` and
-    ``zero`` 0; MJCF's ``pos`` and ``ref`` of a joint are these. A body of MJCF with several joints becomes several links,
-    of which only the last has geometries. A mimic joint has no coordinate of its own.
+    ``zero`` 0; MJCF's ``pos`` and ``ref`` of a joint are these. A body of MJCF with several joints becomes several
+    links, of which only the last has geometries. A mimic joint has no coordinate of its own.
     """
 
     name: str
@@ -187,22 +187,27 @@ class Joint:
         return 0 if self.mimic else COORDINATES[self.kind]
 
 
+Format = Literal["urdf", "mjcf", "sdf"]
+
+
 @dataclass(frozen=True, eq=False)
 class Description:
     """A robot as it was described.
 
     ``links`` and ``joints`` are in the order of the file but for this: a joint's parent link comes before its child, so
     that one pass from the front computes all frames. The first link is the root. ``disabled`` are pairs of links, as
-    sorted tuples of names, that an SRDF or an ``<exclude>`` calls never in contact, with the reason given.
+    sorted tuples of names, that an SRDF or an ``<exclude>`` calls never in contact, with the reason given. ``home`` is
+    the configuration (nq,) in which the robot begins: what MJCF says, else zeros as far as the limits allow.
     """
 
     name: str
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
     source: Path
-    format: Literal["urdf", "mjcf", "sdf"]
+    format: Format
     disabled: Mapping[tuple[str, str], str] = field(default_factory=dict)
     notes: Sequence[Note] = ()
+    home: tuple[float, ...] = ()
 
     @property
     def nq(self) -> int:

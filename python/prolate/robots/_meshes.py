@@ -1,0 +1,201 @@
+"""The meshes that descriptions name: where the file is, and its triangles in metres, sized as simulators size them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Union
+
+import numpy as np
+
+from .._errors import Error
+from .._mesh import load_mesh
+from ._model import MeshShape
+
+if TYPE_CHECKING:
+    from ._xml import Element
+
+Folders = Union[str, "os.PathLike[str]", Iterable[Union[str, "os.PathLike[str]"]]]
+COLLADA = "{*}"  # of any namespace: 1.4 and 1.5 have different ones
+
+
+class MeshError(Exception):
+    """Why there are no triangles, and what to do."""
+
+
+@dataclass
+class Packages:
+    """Where ``package://name/…`` and ``model://name/…`` lead.
+
+    ``named`` are folders that the user gave, by package. Then come the folders of ROS_PACKAGE_PATH (ROS 1),
+    AMENT_PREFIX_PATH (ROS 2), GZ_SIM_RESOURCE_PATH and its older names (Gazebo), and those above the description.
+    """
+
+    description: Path
+    named: Mapping[str, list[Path]]
+
+    @staticmethod
+    def of(description: Path, packages: Mapping[str, Folders] | None) -> Packages:
+        named = {}
+        for name, folders in (packages or {}).items():
+            many = [folders] if isinstance(folders, (str, os.PathLike)) else list(folders)
+            named[name] = [Path(folder) for folder in many]
+        return Packages(description, named)
+
+    def candidates(self, package: str) -> list[Path]:
+        """Folders that may be the package, the likeliest first; not all need exist."""
+
+        def listed(variable: str) -> list[Path]:
+            return [Path(entry) for entry in os.environ.get(variable, "").split(os.pathsep) if entry]
+
+        out = list(self.named.get(package, []))
+        for folder in listed("ROS_PACKAGE_PATH"):
+            out += [folder / package, *([folder] if folder.name == package else [])]
+        out += [folder / "share" / package for folder in listed("AMENT_PREFIX_PATH")]
+        for variable in ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH"):
+            out += [folder / package for folder in listed(variable)]
+        for folder in self.description.resolve().parents:
+            out += [*([folder] if folder.name == package else []), folder / package]
+        return out
+
+    def find(self, name: str) -> Path:
+        """The file that a description calls ``name``."""
+        scheme, colon, rest = name.partition("://")
+        if colon and scheme == "file":
+            return self._existing(name, [Path(rest)])
+        if colon and scheme in ("package", "model"):
+            package, _, inside = rest.partition("/")
+            folders = self.candidates(package)
+            if not any(folder.is_dir() for folder in folders):
+                raise MeshError(
+                    f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
+                    f"{self.description.parent}; say where with --package {package}=FOLDER (packages= in Python)"
+                )
+            return self._existing(name, [folder / inside for folder in folders])
+        if colon:
+            raise MeshError(f"{name}: only package://, model:// and file:// are followed; give a path")
+        return self._existing(name, [self.description.parent / name])
+
+    @staticmethod
+    def _existing(name: str, paths: list[Path]) -> Path:
+        for path in paths:
+            if path.is_file():
+                return path
+        there = next((path for path in paths if path.parent.is_dir()), paths[0])
+        raise MeshError(f"{name}: there is no file {there}; put it there, or correct the name")
+
+
+@dataclass
+class Meshes:
+    """Reads each file once for each way in which it is sized."""
+
+    packages: Packages
+    dae_unit: Literal["obey", "ignore"] | None = None
+    gltf_axes: Literal["keep", "turn"] | None = None
+    _read: dict[tuple[Path, tuple[float, float, float]], tuple[MeshShape, list[str]]] = field(default_factory=dict)
+
+    def shape(self, name: str, scale: tuple[float, float, float]) -> tuple[MeshShape, list[str]]:
+        """The mesh, and what should be said about it. Raises MeshError."""
+        if 0 in scale:
+            raise MeshError(
+                f"{name}: a scale of {scale[0]:g} {scale[1]:g} {scale[2]:g} leaves no volume; none may be 0"
+            )
+        path = self.packages.find(name)
+        if (path, scale) not in self._read:
+            self._read[path, scale] = self._shape(path, scale)
+        return self._read[path, scale]
+
+    def _shape(self, path: Path, scale: tuple[float, float, float]) -> tuple[MeshShape, list[str]]:
+        notes: list[str] = []
+        kind = path.suffix.lower()
+        unit = self._collada_unit(path, scale, notes) if kind == ".dae" else None  # what the format defines
+        turn = kind in (".gltf", ".glb") and self._gltf_turns(path)
+        if kind == ".obj":
+            notes += _parts(path)
+        try:
+            # A mesh far from its origin keeps its precision by being read near the middle and moved in double.
+            mesh = load_mesh(path, unit=unit, scale=None if turn else scale, recentre=True)
+        except Error as error:
+            raise MeshError(str(error)) from None
+        vertices, faces = mesh.vertices.astype(np.float64) + mesh.origin, mesh.faces.astype(np.int64)
+        if turn:  # Y up becomes Z up, and only then come the description's factors
+            vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1) * scale
+            faces = faces[:, ::-1].copy() if np.prod(scale) < 0 else faces
+        notes += [
+            f"{path.name}: {note}" for note in mesh.notes if unit is None or "unit" not in note
+        ]  # a DAE's: see above
+        return MeshShape(vertices, faces, path, scale, unit or 1.0), notes
+
+    def _collada_unit(self, path: Path, scale: tuple[float, float, float], notes: list[str]) -> float:
+        """Metres of a unit of the file, as the user wants it read."""
+        unit, up = collada_frame(path)
+        if up != "Z_UP":
+            notes.append(f"{path.name}: states {up}; its axes are kept, as all loaders of robots that were tried do")
+        if unit == 1.0:
+            return 1.0
+        if self.dae_unit is None:
+            mesh = load_mesh(path, scale=scale, recentre=True)
+            size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+            as_read, as_stated = (" x ".join(f"{by * float(edge):.4g}" for edge in size) for by in (1, unit))
+            raise MeshError(
+                f"{path}: states a unit of {unit:g} m, which loaders read differently. --dae-unit ignore (Pinocchio, "
+                f"yourdfpy, Newton, Genesis) makes it {as_read} m, --dae-unit obey (PyBullet, SAPIEN, scikit-robot) "
+                f"{as_stated} m; say which (dae_unit= in Python)"
+            )
+        notes.append(f"{path.name}: states a unit of {unit:g} m, --dae-unit {self.dae_unit}; other loaders differ")
+        return unit if self.dae_unit == "obey" else 1.0
+
+    def _gltf_turns(self, path: Path) -> bool:
+        if self.gltf_axes is None:
+            raise MeshError(
+                f"{path}: loaders place glTF differently. --gltf-axes keep takes its axes as they are (Pinocchio, "
+                "yourdfpy, Newton, SAPIEN), --gltf-axes turn makes its Y axis the link's Z (Drake); say which "
+                "(gltf_axes= in Python)"
+            )
+        return self.gltf_axes == "turn"
+
+
+def collada_frame(path: Path) -> tuple[float, str]:
+    """The unit in metres and the up axis that a DAE states, or the format's defaults."""
+    from ._xml import parse
+
+    try:
+        asset = parse(path).find(f"{COLLADA}asset")
+    except Error as error:
+        raise MeshError(str(error)) from None
+    return collada_unit(asset), _text(asset, "up_axis") or "Y_UP"
+
+
+def collada_unit(asset: Element) -> float:
+    unit = None if asset is None else asset.find(f"{COLLADA}unit")
+    try:
+        metre = float(unit.get("meter", "1")) if unit is not None else 1.0
+    except ValueError:
+        return 1.0
+    return metre if metre > 0 else 1.0
+
+
+def _text(element: Element, child: str) -> str:
+    found = None if element is None else element.find(f"{COLLADA}{child}")
+    return "" if found is None else (found.text or "").strip()
+
+
+def _parts(path: Path) -> list[str]:
+    """A word about an OBJ with several parts."""
+    with path.open("rb") as file:
+        parts = 0
+        between = True  # faces of a part before
+        for line in file:
+            if line[:2] in (b"o ", b"g "):
+                between = True
+            elif between and line[:2] == b"f ":
+                parts += 1
+                between = False
+    if parts < 2:
+        return []
+    return [
+        f"{path.name}: has {parts} parts (o or g), all of which count here; MuJoCo keeps the faces of the first, "
+        "Genesis loses the others, Drake makes one hull of all"
+    ]
