@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from .._errors import Error
-from ._model import Description, Format, Inertial, Joint, Link, Mimic
+from ._model import COORDINATES, Description, Format, Inertial, Joint, Link, Mimic
 from ._xml import Notes
 
 Part = TypeVar("Part", Link, Joint)
@@ -138,13 +138,25 @@ def _mimics(joints: list[Joint], notes: Notes) -> list[Joint]:
             leader, steps = by_name[leader.mimic.joint], steps + 1
         if not joint.mimic:
             out.append(joint)
-        elif leader.mimic or leader.coordinates != 1 or joint.kind in ("fixed", "planar", "ball", "floating"):
-            text = f"joint {joint.name}: cannot follow {joint.mimic.joint}; both need one coordinate, and no circle"
-            notes.add("error", text + "; it moves by itself here", joint.where, joint.child)
+        elif leader.mimic or leader.coordinates != 1 or COORDINATES[joint.kind] != 1:
+            text = f"joint {joint.name}: cannot follow {joint.mimic.joint}, {_why_not(leader, joint, by_name)}"
+            notes.add("warning", f"{text}; it moves by itself here", joint.where, joint.child)
             out.append(replace(joint, mimic=None))
         else:
             out.append(replace(joint, mimic=Mimic(leader.name, multiplier, offset)))
     return out
+
+
+def _why_not(leader: Joint, joint: Joint, by_name: Mapping[str, Joint]) -> str:
+    if COORDINATES[joint.kind] != 1:
+        return f"being {joint.kind}"
+    if leader.mimic:
+        return (
+            "which follows it in turn"
+            if leader.mimic.joint in by_name
+            else f"as there is no joint {leader.mimic.joint}"
+        )
+    return f"as {leader.name} is {leader.kind}"
 
 
 def _look_at(inertial: Inertial | None, link: Link, notes: Notes) -> None:

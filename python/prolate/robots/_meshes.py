@@ -123,9 +123,8 @@ class Meshes:
         if turn:  # Y up becomes Z up, and only then come the description's factors
             vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1) * scale
             faces = faces[:, ::-1].copy() if np.prod(scale) < 0 else faces
-        notes += [
-            f"{path.name}: {note}" for note in mesh.notes if unit is None or "unit" not in note
-        ]  # a DAE's: see above
+        done_here = ("taken around", "its unit", "states a unit") if kind == ".dae" else ("taken around",)
+        notes += [f"{path.name}: {note}" for note in mesh.notes if not note.startswith(done_here)]
         return MeshShape(vertices, faces, path, scale, unit or 1.0), notes
 
     def _collada_unit(self, path: Path, scale: tuple[float, float, float], notes: list[str]) -> float:

@@ -102,10 +102,12 @@ class MjcfReader:
             return
         name = Path(mesh.file).name if self.spec.strippath else mesh.file
         x, y, z = (float(by) for by in mesh.scale)
-        shape, said = self.meshes.shape(str(Path(self.spec.meshdir) / name), (x, y, z))
-        rotation = quaternion_matrix(*mesh.refquat)
-        vertices = (shape.vertices - mesh.refpos) @ rotation
-        self.files[mesh.name or Path(mesh.file).stem] = MeshShape(vertices, shape.faces, shape.path, shape.scale)
+        if 0 in (x, y, z):
+            raise MeshError(f"{mesh.file}: a scale of {x:g} {y:g} {z:g} leaves no volume; none may be 0")
+        shape, said = self.meshes.shape(str(Path(self.spec.meshdir) / name), (1, 1, 1))
+        vertices = (shape.vertices - mesh.refpos) @ quaternion_matrix(*mesh.refquat) * (x, y, z)  # in MuJoCo's order
+        faces = shape.faces[:, ::-1] if x * y * z < 0 else shape.faces
+        self.files[mesh.name or Path(mesh.file).stem] = MeshShape(vertices, faces, shape.path, (x, y, z))
         for text in said:
             self.notes.once(text, self.where(mesh))
 

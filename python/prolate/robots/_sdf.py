@@ -94,6 +94,8 @@ class SdfReader(SdfFrames):
                 collisions = self._geometries(element, "collision", name, scope)
                 visuals = self._geometries(element, "visual", name, scope) if self.visuals else ()
                 yield Link(name, collisions, visuals, self._inertial(element, name, scope), self.where(element))
+            elif name_of(element) == "joint" and element.get("type") in _TWO_AXES:
+                yield Link(f"{name}::between", where=self.where(element))
 
     def _geometries(self, link: Element, kind: str, name: str, scope: str) -> tuple[Geometry, ...]:
         out = []
@@ -252,7 +254,9 @@ class SdfReader(SdfFrames):
         velocity, effort = self.number(limit, "velocity", -1.0), self.number(limit, "effort", -1.0)
         lower, upper = self.number(limit, "lower", -_NO_LIMIT), self.number(limit, "upper", _NO_LIMIT)
         if lower > upper:
-            raise self.fail(limit, f"joint {name}: lower {lower:g} is above upper {upper:g}")
+            text = f"joint {name}: lower {lower:g} is above upper {upper:g}; it is taken as unlimited"
+            self.notes.add("error", text, self.where(limit))
+            lower, upper = -inf, inf
         lower = -inf if kind == "continuous" or lower <= -_NO_LIMIT else lower
         upper = inf if kind == "continuous" or upper >= _NO_LIMIT else upper
         return lower, upper, velocity if velocity >= 0 else inf, effort if effort >= 0 else inf

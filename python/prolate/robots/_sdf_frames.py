@@ -118,7 +118,7 @@ class SdfFrames(Reader):
         if pose.get("degrees") in ("true", "1"):
             rpy = [math.radians(angle) for angle in rpy]
         elif max(map(abs, rpy)) > TURN:
-            text = f"the pose {text!r} has an angle of more than a turn; it is radians, not degrees"
+            text = f"the pose {text!r} has an angle of more than a turn, read as radians; were degrees meant?"
             self.notes.add("warning", text, self.where(pose))
         return pose_matrix((x, y, z), rpy_matrix(rpy)), relative_to
 

@@ -40,6 +40,7 @@ _JOINTS: dict[str, JointKind] = {
     "fixed": "fixed", "revolute": "revolute", "continuous": "continuous", "prismatic": "prismatic", "planar": "planar",
     "floating": "floating",
 }  # fmt: skip
+_NO_LIMIT = 1e15  # what exporters write for it
 
 
 class UrdfReader(Reader):
@@ -129,7 +130,7 @@ class UrdfReader(Reader):
             raise self.fail(origin, "quat_xyzw= is not read by the tools of today; write rpy=")
         rpy = self.numbers(origin, "rpy", 3, (0, 0, 0))
         if max(map(abs, rpy)) > TURN:
-            text = f"rpy={origin.get('rpy')!r} has an angle of more than a turn; it is radians, not degrees"
+            text = f"rpy={origin.get('rpy')!r} has an angle of more than a turn, read as radians; were degrees meant?"
             self.notes.add("warning", text, self.where(origin), link)
         return pose_matrix(self.numbers(origin, "xyz", 3, (0, 0, 0)), rpy_matrix(rpy))
 
@@ -206,9 +207,13 @@ class UrdfReader(Reader):
             return -inf, inf, velocity, effort
         lower, upper = self.number(element, "lower", 0.0), self.number(element, "upper", 0.0)
         if lower > upper:
-            raise self.fail(element, f"joint {joint.get('name')}: lower={lower:g} is above upper={upper:g}")
-        if kind == "revolute" and max(-lower, upper) > TURN:
-            text = f"joint {joint.get('name')}: {lower:g} to {upper:g} is more than a turn; it is radians, not degrees"
+            text = f"joint {joint.get('name')}: lower={lower:g} is above upper={upper:g}; it is taken as unlimited"
+            self.notes.add("error", text, self.where(element))
+            return -inf, inf, velocity, effort
+        lower, upper = (math.copysign(inf, at) if abs(at) >= _NO_LIMIT else at for at in (lower, upper))
+        if kind == "revolute" and math.isfinite(upper - lower) and max(-lower, upper) > TURN:
+            text = f"{lower:g} to {upper:g} is more than a turn, read as radians; were degrees meant?"
+            text = f"joint {joint.get('name')}: {text}"
             self.notes.add("warning", text, self.where(element))
         return lower, upper, velocity, effort
 
