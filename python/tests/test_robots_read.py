@@ -155,6 +155,12 @@ def test_a_mesh_far_away_keeps_its_shape(write):
     )
 
 
+def test_vertices_without_a_triangle_do_not_count(write):
+    write(TETRAHEDRON.replace("f", "v 9 9 9\nf", 1), "part.obj")
+    shape = robots.load(write(one_link(collision('<mesh filename="part.obj"/>')))).links[0].collisions[0].shape
+    assert len(shape.vertices) == 4 and np.isclose(volume(shape), 1)
+
+
 def test_packages_are_found(write, tmp_path, monkeypatch):
     mesh = one_link(collision('<mesh filename="package://parts/meshes/part.obj"/>'))
     path = write(mesh, "parts/urdf/robot.urdf")

@@ -119,7 +119,8 @@ class Meshes:
             mesh = load_mesh(path, unit=unit, scale=None if turn else scale, recentre=True)
         except Error as error:
             raise MeshError(str(error)) from None
-        vertices, faces = mesh.vertices.astype(np.float64) + mesh.origin, mesh.faces.astype(np.int64)
+        used, faces = np.unique(mesh.faces, return_inverse=True)  # what no triangle uses belongs to no surface
+        vertices, faces = mesh.vertices[used].astype(np.float64) + mesh.origin, faces.reshape(-1, 3).astype(np.int64)
         if turn:  # Y up becomes Z up, and only then come the description's factors
             vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1) * scale
             faces = faces[:, ::-1].copy() if np.prod(scale) < 0 else faces
@@ -136,7 +137,7 @@ class Meshes:
             return 1.0
         if self.dae_unit is None:
             mesh = load_mesh(path, scale=scale, recentre=True)
-            size = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+            size = np.ptp(mesh.vertices[np.unique(mesh.faces)], axis=0)
             as_read, as_stated = (" x ".join(f"{by * float(edge):.4g}" for edge in size) for by in (1, unit))
             raise MeshError(
                 f"{path}: states a unit of {unit:g} m, which loaders read differently. --dae-unit ignore (Pinocchio, "
