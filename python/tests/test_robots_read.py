@@ -329,8 +329,10 @@ def test_srdf(write):
 def test_xacro(write):
     pytest.importorskip("xacro")
     text = ARM.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
-    text = text.replace('<box size="1 2 3"/>', '<box size="${1} ${1 + 1} 3"/>')
-    robot = robots.load(write(text, "arm.urdf.xacro"))
+    text = text.replace('<box size="1 2 3"/>', '<xacro:arg name="z" default="4"/><box size="${1} ${1 + 1} $(arg z)"/>')
+    robot = robots.load(write(text, "arm.urdf.xacro"), xacro_args={"z": "3"})
     assert robot.links[0].collisions[0].shape == robots.BoxShape((1, 2, 3)) and robot.nq == 3
     with pytest.raises(prolate.Error, match="xacro: "):
         robots.load(write(text.replace("${1}", "${one}"), "broken.xacro"))
+    with pytest.raises(prolate.Error, match="expand it where ROS is installed"):
+        robots.load(write(text.replace("${1}", "$(find one)"), "find.xacro"))
