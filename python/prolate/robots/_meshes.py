@@ -71,7 +71,8 @@ class Packages:
             if not any(folder.is_dir() for folder in folders):
                 raise MeshError(
                     f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
-                    f"{self.description.parent}; say where with --package {package}=FOLDER (packages= in Python)"
+                    f"{self.description.resolve().parent}; say where with --package {package}=FOLDER (in Python "
+                    "packages=)"
                 )
             return self._existing(name, [folder / inside for folder in folders])
         if colon:
