@@ -31,7 +31,7 @@ from ._model import (
     Shape,
     SphereShape,
 )
-from ._xml import TURN, BadElement, Notes, Reader, name_of, pose_matrix, rpy_matrix
+from ._xml import TURN, BadElement, Notes, Reader, library, name_of, pose_matrix, rpy_matrix
 
 if TYPE_CHECKING:
     from ._xml import Element
@@ -224,12 +224,7 @@ class UrdfReader(Reader):
 
 def expand_xacro(path: Path, arguments: Mapping[str, str]) -> bytes:
     """The URDF that a xacro file makes."""
-    try:
-        import xacro
-    except ImportError:
-        raise Error(
-            f"{path}: xacro is not installed: pip install xacro, or make the URDF with it elsewhere", "unsupported"
-        ) from None
+    xacro = library("xacro", f"{path}")
     try:
         return bytes(xacro.process_file(str(path), mappings=dict(arguments)).toprettyxml(encoding="utf-8"))
     except Exception as error:  # whatever macros and the Python in them raise
