@@ -4,7 +4,7 @@
 # A good guess: URDF names the joint that a <mimic> follows; where either stands in the file, and what they are called,
 # means nothing. A gripper whose two fingers hang on one palm reads with mimic=True.
 # What it does: it adds joints to the tree in the alphabetical order of their names. The follower is read if the joint
-# that it follows comes before it. Otherwise buildModelFromXML() raises an error. So does a follower of a follower.
+# that it follows comes before it. Otherwise buildModelFromXML() raises an error.
 #
 # Seen (two fingers on one link, the second written follows the first, mimic=True):
 #     a <- b: 1 coordinate
