@@ -71,7 +71,7 @@ def load(
     source = Path(path_of("path", path))
     _check("dae_unit", dae_unit, ("obey", "ignore"))
     _check("gltf_axes", gltf_axes, ("keep", "turn"))
-    notes = Notes(source)
+    notes = Notes()
     meshes = Meshes(Packages.of(source, packages), dae_unit, gltf_axes)
     text = None
     if source.suffix == ".xacro":
@@ -97,7 +97,7 @@ def _parts(root: Element, source: Path, meshes: Meshes, notes: Notes, visuals: b
 
 
 def _with_srdf(description: Description, path: Path) -> Description:
-    notes = Notes(path)
+    notes = Notes()
     pairs = read_srdf(path, {link.name for link in description.links}, notes)
     return replace(description, disabled={**description.disabled, **pairs}, notes=(*description.notes, *notes.all))
 

@@ -29,10 +29,9 @@ class BadElement(Exception):
 
 
 class Notes:
-    """Notes about one file, in the order in which they come up."""
+    """In the order in which they come up."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self) -> None:
         self.all: list[Note] = []
         self._known: set[tuple[str, str]] = set()
 
