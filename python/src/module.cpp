@@ -67,6 +67,7 @@ NB_MODULE(_core, m) {
     python::bind_points(m);
     python::bind_primitives(m);
     python::bind_pairs(m);
+    python::bind_robot(m);
     python::bind_shapes(m);
     python::bind_world(m);
 }

@@ -205,6 +205,25 @@ RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) n
     return {pose, 1.0001 * (std::sqrt(moved) + 2 * bent * reach) + 0x1p-46 * lengths};
 }
 
+Vec3 rounded(const Point& p, double& slack) noexcept {
+    const Vec3 out{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+    slack += std::hypot(p[0] - out.x, p[1] - out.y, p[2] - out.z);
+    return out;
+}
+
+HalfSpace half_space_in_frame(double reach, const DoublePose& body, std::span<const double> n, double& slack) noexcept {
+    const double length = std::hypot(n[0], n[1], n[2]);
+    const Point normal = {n[0] / length, n[1] / length, n[2] / length};
+    const double offset = n[3] / length;
+    const double below = offset - (normal[0] * body.t[0] + normal[1] * body.t[1] + normal[2] * body.t[2]);
+    double bent = 0;
+    const Vec3 local_normal = rounded(rotated_back(body, normal), bent);
+    const auto local_offset = static_cast<float>(below);
+    const double lengths = std::abs(body.t[0]) + std::abs(body.t[1]) + std::abs(body.t[2]) + std::abs(offset);
+    slack = 4 * bent * (reach + std::abs(below)) + std::abs(below - local_offset) + 0x1p-46 * (reach + lengths);
+    return {local_normal, local_offset};
+}
+
 RoundedMotion motion_in(const Frame& frame, const DoublePose& start, const DoublePose& end, double reach) noexcept {
     const RoundedPose from = in_frame(frame, start, reach), to = in_frame(frame, end, reach);
     // In between, a point is off by no more than at both ends together, the turn of at most pi between them included;

@@ -8,10 +8,12 @@
 
 #include "python/src/arrays.hpp"
 
+#include <prolate/shapes.hpp>
 #include <prolate/sweep.hpp>
 #include <prolate/types.hpp>
 
 #include <array>
+#include <span>
 #include <vector>
 
 namespace prolate::python {
@@ -87,6 +89,13 @@ struct RoundedPose {
     double slack;
 };
 RoundedPose in_frame(const Frame& frame, const DoublePose& body, double reach) noexcept;
+
+/// `p`, rounded; adds to `slack` by how much.
+Vec3 rounded(const Point& p, double& slack) noexcept;
+
+/// The half-space normal.p <= offset, {normal, offset} in `n`, in the frame of a body. Where the body is, within
+/// `reach` of its origin, its plane is off by at most `slack`.
+HalfSpace half_space_in_frame(double reach, const DoublePose& body, std::span<const double> n, double& slack) noexcept;
 
 /// A motion between two poses, rounded in `frame`, and by how much that moves any of its points at most.
 struct RoundedMotion {

@@ -14,29 +14,6 @@
 namespace prolate::python {
 namespace {
 
-Vec3 rounded(const Point& p, double& slack) noexcept {
-    const Vec3 out{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
-    slack += std::hypot(p[0] - out.x, p[1] - out.y, p[2] - out.z);
-    return out;
-}
-
-// The half-space normal.p <= offset, {normal, offset} in `n`, in the body's frame. Near the body, its plane is off by
-// at most `slack`.
-HalfSpace half_space_in_frame(const HeldTree& held, const DoublePose& body, std::span<const double> n,
-                              double& slack) noexcept {
-    const double length = std::hypot(n[0], n[1], n[2]);
-    const Point normal = {n[0] / length, n[1] / length, n[2] / length};
-    const double offset = n[3] / length;
-    const double below = offset - (normal[0] * body.t[0] + normal[1] * body.t[1] + normal[2] * body.t[2]);
-    double bent = 0;
-    const Vec3 local_normal = rounded(rotated_back(body, normal), bent);
-    const auto local_offset = static_cast<float>(below);
-    const double lengths = std::abs(body.t[0]) + std::abs(body.t[1]) + std::abs(body.t[2]) + std::abs(offset);
-    slack =
-        4 * bent * (held.reach + std::abs(below)) + std::abs(below - local_offset) + 0x1p-46 * (held.reach + lengths);
-    return {local_normal, local_offset};
-}
-
 // The shapes of python/prolate/_shapes.py, as their numbers in the world. Each is taken into the body's frame.
 class Shape {
 public:
@@ -67,7 +44,7 @@ public:
             slack = box.slack;
             return ask(Box{box.pose, {rounded_up(n_[7]), rounded_up(n_[8]), rounded_up(n_[9])}});
         }
-        return ask(half_space_in_frame(held, body, n_, slack));
+        return ask(half_space_in_frame(held.reach, body, n_, slack));
     }
 
 private:
@@ -129,7 +106,7 @@ struct OverGround {
     HalfSpace at(size_t i, PlacedBodies& placed) const noexcept {
         placed.in_frame = true;
         placed.frame = poses.at(i);
-        return half_space_in_frame(held, placed.frame, plane.values, placed.slack);
+        return half_space_in_frame(held.reach, placed.frame, plane.values, placed.slack);
     }
 };
 

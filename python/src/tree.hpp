@@ -32,6 +32,7 @@ void bind_contacts(nb::module_& m);
 void bind_points(nb::module_& m);
 void bind_primitives(nb::module_& m);
 void bind_pairs(nb::module_& m);
+void bind_robot(nb::module_& m);
 void bind_shapes(nb::module_& m);
 void bind_world(nb::module_& m);
 

@@ -1,11 +1,13 @@
-"""Reads the pairs of links that an SRDF, MoveIt's companion of a URDF, calls never in contact."""
+"""Reads and writes the pairs of links that an SRDF, MoveIt's companion of a URDF, calls never in contact."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from ._xml import BadElement, Notes, Reader, parse
+
+Pairs = Mapping[tuple[str, str], str]
 
 
 def read_srdf(path: Path, links: Collection[str], notes: Notes) -> dict[tuple[str, str], str]:
