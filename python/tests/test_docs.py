@@ -1,4 +1,4 @@
-"""The programs of docs/python.md and README.md."""
+"""The programs of docs/python.md, docs/robots.md and README.md."""
 
 from __future__ import annotations
 
@@ -41,6 +41,12 @@ def test_python_md(tmp_path, monkeypatch, capsys):
         for picture in tmp_path.glob("*.png"):
             picture.rename(Path(folder) / picture.name)
     print(capsys.readouterr().out)
+
+
+def test_robots_md(tmp_path, monkeypatch):
+    pytest.importorskip("lxml")
+    monkeypatch.chdir(tmp_path)
+    run("docs/robots.md")
 
 
 @needs_models

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+
 import numpy as np
 import pytest
 from robot_files import TETRAHEDRON, frames, link, texts, volume
@@ -212,6 +214,28 @@ def test_a_unit_that_loaders_read_differently_is_asked_for(write):
         assert shape.unit == size and "states a unit of 0.001 m" in texts(robot, "info")[0]
 
 
+GLTF = """{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 2, 3]},
+{"bufferView": 1, "componentType": 5125, "count": 12, "type": "SCALAR"}],
+"bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 48}],
+"buffers": [{"byteLength": 96, "uri": "data:application/octet-stream;base64,%s"}]}"""
+
+
+@pytest.mark.parametrize("scale", [(1, 1, 1), (1, -2, 3)])
+def test_axes_of_a_gltf_are_asked_for(write, scale):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], dtype="<f4")
+    corners = np.array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], dtype="<u4")
+    write(GLTF % base64.b64encode(points.tobytes() + corners.tobytes()).decode(), "part.gltf")
+    path = write(one_link(collision('<mesh filename="part.gltf" scale="{} {} {}"/>'.format(*scale))))
+    (error,) = texts(robots.load(path), "error")
+    assert "--gltf-axes keep" in error and "--gltf-axes turn" in error
+    for how, size in (("keep", (1, 2, 3)), ("turn", (1, 3, 2))):
+        shape = robots.load(path, gltf_axes=how).links[0].collisions[0].shape
+        np.testing.assert_allclose(np.ptp(shape.vertices, axis=0), np.abs(np.multiply(size, scale)), rtol=1e-6)
+        assert np.isclose(volume(shape), abs(np.prod(scale)), rtol=1e-6)
+
+
 def test_parts_of_an_obj_are_named(write):
     write(
         "o one\n" + TETRAHEDRON + "o two\nv 5 0 0\nv 6 0 0\nv 5 1 0\nv 5 0 1\nf 5 7 6\nf 5 6 8\nf 5 8 7\nf 6 7 8\n",
@@ -329,8 +353,10 @@ def test_srdf(write):
 def test_xacro(write):
     pytest.importorskip("xacro")
     text = ARM.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
-    text = text.replace('<box size="1 2 3"/>', '<box size="${1} ${1 + 1} 3"/>')
-    robot = robots.load(write(text, "arm.urdf.xacro"))
+    text = text.replace('<box size="1 2 3"/>', '<xacro:arg name="z" default="4"/><box size="${1} ${1 + 1} $(arg z)"/>')
+    robot = robots.load(write(text, "arm.urdf.xacro"), xacro_args={"z": "3"})
     assert robot.links[0].collisions[0].shape == robots.BoxShape((1, 2, 3)) and robot.nq == 3
     with pytest.raises(prolate.Error, match="xacro: "):
         robots.load(write(text.replace("${1}", "${one}"), "broken.xacro"))
+    with pytest.raises(prolate.Error, match="expand it where ROS is installed"):
+        robots.load(write(text.replace("${1}", "$(find one)"), "find.xacro"))

@@ -24,9 +24,7 @@ class Parts:
     links: Sequence[Link]
     joints: Sequence[Joint]
     disabled: Mapping[tuple[str, str], str] = field(default_factory=dict)
-    home: Mapping[str, tuple[float, ...]] = field(
-        default_factory=dict
-    )  # coordinates of joints, where the file has them
+    home: Mapping[str, tuple[float, ...]] = field(default_factory=dict)  #: coordinates of joints that the file states
 
 
 def assemble(parts: Parts, source: Path, kind: Format, notes: Notes) -> Description:
@@ -75,9 +73,8 @@ def _unique(all_of_them: Sequence[Part], what: str, notes: Notes) -> dict[str, P
     out: dict[str, Part] = {}
     for one in all_of_them:
         if one.name in out:
-            notes.add(
-                "error", f"there is another {what} {one.name} at {out[one.name].where}; this one is left out", one.where
-            )
+            text = f"there is another {what} {one.name} at {out[one.name].where}; this one is left out"
+            notes.add("error", text, one.where)
         else:
             out[one.name] = one
     return out
@@ -151,11 +148,9 @@ def _why_not(leader: Joint, joint: Joint, by_name: Mapping[str, Joint]) -> str:
     if COORDINATES[joint.kind] != 1:
         return f"being {joint.kind}"
     if leader.mimic:
-        return (
-            "which follows it in turn"
-            if leader.mimic.joint in by_name
-            else f"as there is no joint {leader.mimic.joint}"
-        )
+        if leader.mimic.joint not in by_name:
+            return f"as there is no joint {leader.mimic.joint}"
+        return "which follows it in turn"
     return f"as {leader.name} is {leader.kind}"
 
 

@@ -75,13 +75,21 @@ def _command(
     reading.add_argument(
         "--package",
         metavar="NAME=FOLDER",
-        type=_package,
+        type=_pair,
         action="append",
         default=[],
         help="where package://NAME/... leads; otherwise ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, Gazebo's paths and the "
         "folders above the file are searched",
     )
     reading.add_argument("--srdf", metavar="FILE", help="names pairs of links that are never in contact")
+    reading.add_argument(
+        "--xacro-arg",
+        metavar="NAME=VALUE",
+        type=_pair,
+        action="append",
+        default=[],
+        help="an argument of a xacro file",
+    )
     reading.add_argument(
         "--dae-unit",
         choices=["obey", "ignore"],
@@ -98,11 +106,11 @@ def _command(
     return parser
 
 
-def _package(text: str) -> tuple[str, str]:
-    name, equals, folder = text.partition("=")
-    if not (name and equals and folder):
-        raise argparse.ArgumentTypeError(f"must be NAME=FOLDER, not {text!r}")
-    return name, folder
+def _pair(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise argparse.ArgumentTypeError(f"must have the form NAME=..., not {text!r}")
+    return name, value
 
 
 def _load(options: argparse.Namespace, visuals: bool) -> Description:
@@ -113,6 +121,7 @@ def _load(options: argparse.Namespace, visuals: bool) -> Description:
         options.robot,
         packages=packages,
         srdf=options.srdf,
+        xacro_args=dict(options.xacro_arg),
         dae_unit=options.dae_unit,
         gltf_axes=options.gltf_axes,
         visuals=visuals,
@@ -203,3 +212,7 @@ def _summary(robot: Description) -> dict[str, Any]:
             for note in robot.notes
         ],
     }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -6,19 +6,16 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Union
+from typing import Literal, Union
 
 import numpy as np
 
 from .._errors import Error
 from .._mesh import load_mesh
-from ._model import MeshShape
-
-if TYPE_CHECKING:
-    from ._xml import Element
+from ._model import Matrix, MeshShape
+from ._xml import parse
 
 Folders = Union[str, "os.PathLike[str]", Iterable[Union[str, "os.PathLike[str]"]]]
-COLLADA = "{*}"  # of any namespace: 1.4 and 1.5 have different ones
 
 
 class MeshError(Exception):
@@ -71,7 +68,8 @@ class Packages:
             if not any(folder.is_dir() for folder in folders):
                 raise MeshError(
                     f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
-                    f"{self.description.parent}; say where with --package {package}=FOLDER (packages= in Python)"
+                    f"{self.description.resolve().parent}; say where with --package {package}=FOLDER (in Python "
+                    "packages=)"
                 )
             return self._existing(name, [folder / inside for folder in folders])
         if colon:
@@ -108,36 +106,34 @@ class Meshes:
         return self._read[path, scale]
 
     def _shape(self, path: Path, scale: tuple[float, float, float]) -> tuple[MeshShape, list[str]]:
-        notes: list[str] = []
         kind = path.suffix.lower()
-        unit = self._collada_unit(path, scale, notes) if kind == ".dae" else None  # what the format defines
         turn = kind in (".gltf", ".glb") and self._gltf_turns(path)
-        if kind == ".obj":
-            notes += _parts(path)
         try:
             # A mesh far from its origin keeps its precision by being read near the middle and moved in double.
-            mesh = load_mesh(path, unit=unit, scale=None if turn else scale, recentre=True)
+            mesh = load_mesh(path, recentre=True)
         except Error as error:
             raise MeshError(str(error)) from None
         used, faces = np.unique(mesh.faces, return_inverse=True)  # what no triangle uses belongs to no surface
         vertices, faces = mesh.vertices[used].astype(np.float64) + mesh.origin, faces.reshape(-1, 3).astype(np.int64)
-        if turn:  # Y up becomes Z up, and only then come the description's factors
-            vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1) * scale
-            faces = faces[:, ::-1].copy() if np.prod(scale) < 0 else faces
-        done_here = ("taken around", "its unit", "states a unit") if kind == ".dae" else ("taken around",)
-        notes += [f"{path.name}: {note}" for note in mesh.notes if not note.startswith(done_here)]
-        return MeshShape(vertices, faces, path, scale, unit or 1.0), notes
+        if turn:
+            vertices = np.stack([vertices[:, 0], -vertices[:, 2], vertices[:, 1]], axis=1)
+        vertices *= scale
+        notes, unit, done = _parts(path) if kind == ".obj" else [], 1.0, ["taken around"]
+        if kind == ".dae":
+            unit = self._collada_unit(path, np.ptp(vertices, axis=0), notes)
+            done += ["its unit", "states a unit"]
+        notes += [f"{path.name}: {note}" for note in mesh.notes if not note.startswith(tuple(done))]
+        faces = faces[:, ::-1].copy() if np.prod(scale) < 0 else faces
+        return MeshShape(vertices * unit, faces, path, scale, unit), notes
 
-    def _collada_unit(self, path: Path, scale: tuple[float, float, float], notes: list[str]) -> float:
-        """Metres of a unit of the file, as the user wants it read."""
-        unit, up = collada_frame(path)
+    def _collada_unit(self, path: Path, size: Matrix, notes: list[str]) -> float:
+        """Metres of a unit of the file, as the user wants it read; ``size`` is the mesh's if it is the metre."""
+        unit, up = _collada_frame(path)
         if up != "Z_UP":
             notes.append(f"{path.name}: states {up}; its axes are kept, as all loaders of robots that were tried do")
         if unit == 1.0:
             return 1.0
         if self.dae_unit is None:
-            mesh = load_mesh(path, scale=scale, recentre=True)
-            size = np.ptp(mesh.vertices[np.unique(mesh.faces)], axis=0)
             as_read, as_stated = (" x ".join(f"{by * float(edge):.4g}" for edge in size) for by in (1, unit))
             raise MeshError(
                 f"{path}: states a unit of {unit:g} m, which loaders read differently. --dae-unit ignore (Pinocchio, "
@@ -157,29 +153,15 @@ class Meshes:
         return self.gltf_axes == "turn"
 
 
-def collada_frame(path: Path) -> tuple[float, str]:
+def _collada_frame(path: Path) -> tuple[float, str]:
     """The unit in metres and the up axis that a DAE states, or the format's defaults."""
-    from ._xml import parse
-
-    try:
-        asset = parse(path).find(f"{COLLADA}asset")
-    except Error as error:
-        raise MeshError(str(error)) from None
-    return collada_unit(asset), _text(asset, "up_axis") or "Y_UP"
-
-
-def collada_unit(asset: Element) -> float:
-    unit = None if asset is None else asset.find(f"{COLLADA}unit")
+    root = parse(path)
+    unit, up = (root.find(f"{{*}}asset/{{*}}{name}") for name in ("unit", "up_axis"))  # COLLADA 1.4 and 1.5
     try:
         metre = float(unit.get("meter", "1")) if unit is not None else 1.0
     except ValueError:
-        return 1.0
-    return metre if metre > 0 else 1.0
-
-
-def _text(element: Element, child: str) -> str:
-    found = None if element is None else element.find(f"{COLLADA}{child}")
-    return "" if found is None else (found.text or "").strip()
+        metre = 1.0
+    return metre if metre > 0 else 1.0, "Y_UP" if up is None else (up.text or "").strip()
 
 
 def _parts(path: Path) -> list[str]:

@@ -32,7 +32,7 @@ from ._model import (
     Where,
 )
 from ._srdf import pair_of
-from ._xml import Notes, pose_matrix, quaternion_matrix
+from ._xml import Notes, library, pose_matrix, quaternion_matrix
 
 if TYPE_CHECKING:
     Spec = Any  # mujoco.MjSpec
@@ -43,10 +43,7 @@ _NO_MASS = 1e-12  # what a body without any gets here, so that MuJoCo compiles t
 
 
 def read_mjcf(path: Path, meshes: Meshes, notes: Notes, visuals: bool) -> Parts:
-    try:
-        import mujoco
-    except ImportError:
-        raise Error(f"{path}: reading MJCF needs MuJoCo: pip install 'prolate[robots]'", "unsupported") from None
+    mujoco = library("mujoco", "reading MJCF")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         reader = MjcfReader(path, spec, meshes, notes, visuals)
@@ -63,9 +60,7 @@ class MjcfReader:
     model: Model
 
     def __init__(self, path: Path, spec: Spec, meshes: Meshes, notes: Notes, visuals: bool) -> None:
-        import mujoco
-
-        self.mujoco = mujoco
+        self.mujoco = library("mujoco", "reading MJCF")
         self.path, self.spec, self.meshes, self.notes, self.visuals = path, spec, meshes, notes, visuals
         self.files: dict[str, MeshShape] = {}  # by the asset's name
 

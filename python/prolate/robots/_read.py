@@ -12,7 +12,7 @@ from .._errors import Error, path_of
 from ._assemble import Parts, assemble
 from ._meshes import Folders, Meshes, Packages
 from ._mjcf import read_mjcf
-from ._model import Description, Format
+from ._model import Description, Format, Where
 from ._sdf import SdfReader
 from ._srdf import read_srdf
 from ._urdf import UrdfReader, expand_xacro
@@ -27,6 +27,7 @@ def load(
     *,
     packages: Mapping[str, Folders] | None = None,
     srdf: Union[str, os.PathLike[str], None] = None,
+    xacro_args: Mapping[str, str] | None = None,
     dae_unit: Literal["obey", "ignore"] | None = None,
     gltf_axes: Literal["keep", "turn"] | None = None,
     visuals: bool = True,
@@ -44,6 +45,8 @@ def load(
         paths are searched, and the folders above the file for one of that name.
     srdf : path-like, optional
         Names pairs of links that are never in contact.
+    xacro_args : mapping of str to str, optional
+        Arguments of a xacro file.
     dae_unit : {"obey", "ignore"}, optional
         Whether the unit that a DAE states scales it. Loaders differ, so one other than the metre needs this.
     gltf_axes : {"keep", "turn"}, optional
@@ -68,9 +71,13 @@ def load(
     source = Path(path_of("path", path))
     _check("dae_unit", dae_unit, ("obey", "ignore"))
     _check("gltf_axes", gltf_axes, ("keep", "turn"))
-    notes = Notes(source)
+    notes = Notes()
     meshes = Meshes(Packages.of(source, packages), dae_unit, gltf_axes)
-    root = parse(source, expand_xacro(source) if source.suffix == ".xacro" else None)
+    text = None
+    if source.suffix == ".xacro":
+        text = expand_xacro(source, xacro_args or {})
+        notes.add("info", "lines are those of the URDF that xacro makes of it", Where(source))
+    root = parse(source, text)
     description = assemble(*_parts(root, source, meshes, notes, visuals), notes)
     return description if srdf is None else _with_srdf(description, Path(path_of("srdf", srdf)))
 
@@ -90,7 +97,7 @@ def _parts(root: Element, source: Path, meshes: Meshes, notes: Notes, visuals: b
 
 
 def _with_srdf(description: Description, path: Path) -> Description:
-    notes = Notes(path)
+    notes = Notes()
     pairs = read_srdf(path, {link.name for link in description.links}, notes)
     return replace(description, disabled={**description.disabled, **pairs}, notes=(*description.notes, *notes.all))
 

@@ -113,6 +113,8 @@ class SdfFrames(Reader):
             return np.eye(4), relative_to
         if pose.get("rotation_format") == "quat_xyzw":
             x, y, z, qx, qy, qz, qw = self.parsed(pose, text, 7)
+            if not any((qx, qy, qz, qw)):
+                raise self.fail(pose, "a quaternion of zeros is no rotation")
             return pose_matrix((x, y, z), quaternion_matrix(qw, qx, qy, qz)), relative_to
         x, y, z, *rpy = self.parsed(pose, text, 6)
         if pose.get("degrees") in ("true", "1"):

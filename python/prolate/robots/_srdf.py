@@ -1,13 +1,11 @@
-"""Reads and writes the pairs of links that an SRDF, MoveIt's companion of a URDF, calls never in contact."""
+"""Reads the pairs of links that an SRDF, MoveIt's companion of a URDF, calls never in contact."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 
 from ._xml import BadElement, Notes, Reader, parse
-
-Pairs = Mapping[tuple[str, str], str]
 
 
 def read_srdf(path: Path, links: Collection[str], notes: Notes) -> dict[tuple[str, str], str]:

@@ -7,7 +7,7 @@ without a word, and do not say in which line.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +31,7 @@ from ._model import (
     Shape,
     SphereShape,
 )
-from ._xml import TURN, BadElement, Notes, Reader, name_of, pose_matrix, rpy_matrix
+from ._xml import TURN, BadElement, Notes, Reader, library, name_of, pose_matrix, rpy_matrix
 
 if TYPE_CHECKING:
     from ._xml import Element
@@ -222,15 +222,11 @@ class UrdfReader(Reader):
         return Mimic(self.text(element, "joint"), multiplier, offset)
 
 
-def expand_xacro(path: Path) -> bytes:
+def expand_xacro(path: Path, arguments: Mapping[str, str]) -> bytes:
     """The URDF that a xacro file makes."""
+    xacro = library("xacro", f"{path}")
     try:
-        import xacro
-    except ImportError:
-        raise Error(
-            f"{path}: xacro is not installed: pip install xacro, or make the URDF with it elsewhere", "unsupported"
-        ) from None
-    try:
-        return bytes(xacro.process_file(str(path)).toxml(encoding="utf-8"))
+        return bytes(xacro.process_file(str(path), mappings=dict(arguments)).toprettyxml(encoding="utf-8"))
     except Exception as error:  # whatever macros and the Python in them raise
-        raise Error(f"{path}: xacro: {error}", "bad_file") from None
+        advice = "; expand it where ROS is installed, and give the URDF" if "ament_index" in str(error) else ""
+        raise Error(f"{path}: xacro: {error}{advice}", "bad_file") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Collection, Iterable
 from pathlib import Path
@@ -28,10 +29,9 @@ class BadElement(Exception):
 
 
 class Notes:
-    """Notes about one file, in the order in which they come up."""
+    """In the order in which they come up."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self) -> None:
         self.all: list[Note] = []
         self._known: set[tuple[str, str]] = set()
 
@@ -49,12 +49,18 @@ class Notes:
         self.add("error", error.text + (f"; {left_out} is left out" if left_out else ""), error.where, link)
 
 
+def library(name: str, use: str) -> Any:
+    """A module that the package itself does not need."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        text = f"{use} needs {name.partition('.')[0]}: pip install 'prolate[robots]'"
+        raise Error(text, "unsupported") from None
+
+
 def parse(path: Path, text: bytes | None = None) -> Element:
     """The root element of a file, or of ``text`` that was made of it. Entities and other files are not followed."""
-    try:
-        from lxml import etree
-    except ImportError:
-        raise Error("reading robots needs lxml: pip install 'prolate[robots]'", "unsupported") from None
+    etree = library("lxml.etree", "reading robots")
     parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True, remove_pis=True)
     try:
         return etree.fromstring(path.read_bytes() if text is None else text, parser)

@@ -1,0 +1,69 @@
+"""The command prolate-robot."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from robot_files import TETRAHEDRON
+
+pytest.importorskip("lxml")
+from prolate.robots._command import main
+
+ROBOT = """<robot name="r">
+<link name="a"><collision><geometry><mesh filename="package://parts/part.obj" scale="1 1 2"/></geometry></collision>
+<inertial><mass value="1.5"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+<link name="b"><collision><geometry><sphere radius="0.5"/></geometry></collision></link>
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>
+<gazebo/></robot>"""
+
+
+@pytest.fixture
+def robot(tmp_path):
+    (tmp_path / "robot.urdf").write_text(ROBOT)
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "part.obj").write_text(TETRAHEDRON)
+    return tmp_path / "robot.urdf"
+
+
+def test_info_says_what_is_there(robot, capsys):
+    assert main(["info", str(robot), "--package", f"parts={robot.parent / 'here'}"]) == 0
+    out, err = capsys.readouterr()
+    assert "r: urdf, 2 links, 1 joints, 1 coordinates" in out and "a: root, 1.5 kg" in out
+    assert "mesh part.obj 4 triangles, 1 x 2 x 6 m" in out and "b: j (continuous) of a" in out
+    assert "sphere radius=0.5" in out and f"{robot}:6: <gazebo> in <robot> is not understood" in err
+
+
+def test_info_names_what_is_missing_and_goes_on(robot, capsys):
+    assert main(["info", str(robot), "--quiet"]) == 1
+    out, err = capsys.readouterr()
+    assert "2 links" in out and err.startswith(f"error: {robot}:2: link a: ") and "--package parts=FOLDER" in err
+    assert err.count("\n") == 1
+    assert main(["info", str(robot), "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert [link["name"] for link in said["links"]] == ["a", "b"] and said["coordinates"] == 1
+    assert [(note["kind"], note["link"], note["line"]) for note in said["notes"]] == [
+        ("info", "", 6),
+        ("error", "a", 2),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["info", "none.urdf"], 4, "none.urdf: No such file"),
+        (["info", "bad.urdf"], 3, "bad.urdf:1: is not XML"),
+        (["info"], 2, "required: robot"),
+        (["inform", "r"], 2, "invalid choice"),
+        (["info", "r", "--package", "parts"], 2, "must have the form NAME=..."),
+        (["info", "r", "--dae-unit", "maybe"], 2, "invalid choice"),
+    ],
+)
+def test_exit_codes(tmp_path, monkeypatch, capsys, words, code, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.urdf").write_text("no")
+    try:
+        assert main(words) == code
+    except SystemExit as exit:
+        assert exit.code == code
+    assert said in capsys.readouterr().err
