@@ -54,8 +54,8 @@ class MeshShape:
     ``path`` and ``scale`` say where they came from, ``unit`` what a unit of the file is in metres (before ``scale``).
     """
 
-    vertices: Matrix
-    faces: NDArray[np.int64]
+    vertices: Matrix = field(repr=False)
+    faces: NDArray[np.int64] = field(repr=False)
     path: Path | None = None
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     unit: float = 1.0
