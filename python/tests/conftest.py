@@ -84,3 +84,9 @@ def box_b():
 @pytest.fixture(scope="session")
 def cover():
     return prolate.bake(*box_mesh(HALF_A), levels=2, quality="fast")
+
+
+@pytest.fixture(scope="session")
+def bakes(tmp_path_factory):
+    """A cache of bakes that all tests share."""
+    return tmp_path_factory.mktemp("bakes")

@@ -1,8 +1,10 @@
 """Robots: a description in, covers and checks out. docs/robots.md is the tour.
 
-:func:`load` reads a description. It needs ``pip install 'prolate[robots]'``.
+:func:`load` reads a description, :class:`Robot` covers it, and ``write_...`` write what simulators and planners read.
+It needs ``pip install 'prolate[robots]'``.
 """
 
+from ._baked import BakedRobot, LinkCover
 from ._checks import Checks, Pair, RobotDistances
 from ._kinematics import Kinematics
 from ._model import (
@@ -24,10 +26,18 @@ from ._model import (
     Where,
 )
 from ._read import load
+from ._robot import Robot
 from ._scene import PointCloud, Scene
+from ._to_coal import geometry_model
+from ._to_newton import add_to_newton
+from ._write_mjcf import write_mjcf
+from ._write_sdf import write_sdf
+from ._write_spheres import write_spheres
+from ._write_urdf import write_urdf
 
 __all__ = [
     "COORDINATES",
+    "BakedRobot",
     "BoxShape",
     "CapsuleShape",
     "Checks",
@@ -39,15 +49,23 @@ __all__ = [
     "Joint",
     "Kinematics",
     "Link",
+    "LinkCover",
     "MeshShape",
     "Mimic",
     "Note",
     "Pair",
     "PlaneShape",
     "PointCloud",
+    "Robot",
     "RobotDistances",
     "Scene",
     "SphereShape",
     "Where",
+    "add_to_newton",
+    "geometry_model",
     "load",
+    "write_mjcf",
+    "write_sdf",
+    "write_spheres",
+    "write_urdf",
 ]

@@ -1,0 +1,128 @@
+"""One convex body around points: box, ball, cylinder, capsule, or a polyhedron of few vertices.
+
+The bodies come from trimesh (boxes: the least over the faces of the hull; balls and cylinders: local optima) and Qhull.
+Each is then made to hold the points, whatever rounding and optimisers did.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+from ._model import BoxShape, CapsuleShape, CylinderShape, Geometry, Matrix, MeshShape, SphereShape
+from ._solids import grown, hull_of, hull_triangles, inverse, moved, outside
+
+
+def around(points: Matrix, kind: str) -> Geometry:
+    """A small body of a kind (``"sphere"``, ``"box"``, ``"capsule"`` or ``"cylinder"``) that holds the points (n, 3),
+    which are not flat."""
+    found = _FITS[kind](hull_triangles(points)[0])
+    return _holding(found, points)
+
+
+def hull_within(points: Matrix, most: int) -> Geometry:
+    """A convex polyhedron of at most ``most`` vertices (8 or more) that holds the points (n, 3), which are not flat.
+
+    It is their hull if that is small enough. Otherwise half-spaces of the hull's own faces are taken, one by one, that
+    cut off what sticks out most; so none ever cuts the hull.
+    """
+    vertices, faces = hull_triangles(points)
+    if len(vertices) > most:
+        vertices, faces = _outer_hull(hull_of(vertices), most)
+    return Geometry(MeshShape(vertices, faces))
+
+
+def _outer_hull(hull: ConvexHull, most: int) -> tuple[Matrix, NDArray[np.int64]]:
+    planes = hull.equations.copy()
+    corners = hull.points[hull.vertices]
+    planes[:, 3] = -(corners @ planes[:, :3].T).max(0)  # rounding may have moved them inwards
+    inner = corners.mean(0)
+    axes = _box(corners).pose[:3, :3].T
+    box = np.concatenate([axes, -axes])
+    taken = np.column_stack([box, -(corners @ box.T).max(0)])
+    best = _corners(taken, inner)
+    while True:
+        beyond = best @ planes[:, :3].T + planes[:, 3]  # corner by plane
+        corner, plane = np.unravel_index(int(beyond.argmax()), beyond.shape)
+        if beyond[corner, plane] <= 1e-9 * np.ptp(corners):
+            break
+        taken = np.concatenate([taken, planes[plane][None]])
+        found = _corners(taken, inner)
+        if len(found) > most:
+            break
+        best = found
+    return hull_triangles(best)
+
+
+def _corners(planes: Matrix, inner: Matrix) -> Matrix:
+    """Of what lies below all planes, each once."""
+    points = HalfspaceIntersection(planes, inner).intersections
+    near = np.unique((points / np.ptp(points)).round(9), axis=0, return_index=True)[1]
+    corners: Matrix = points[near]
+    return corners
+
+
+def _holding(geometry: Geometry, points: Matrix) -> Geometry:
+    """Grown until all points are in it."""
+    beyond = float(outside(geometry.shape, moved(inverse(geometry.pose), points)).max())
+    return grown(geometry, max(beyond, 0.0) * (1 + 1e-9) + 1e-12) if beyond > -1e-12 else geometry
+
+
+def _box(points: Matrix) -> Geometry:
+    to_origin, (x, y, z) = _trimesh("bounds").oriented_bounds(points)
+    return Geometry(BoxShape((float(x), float(y), float(z))), _rigid(np.linalg.inv(to_origin)))
+
+
+def _sphere(points: Matrix) -> Geometry:
+    center, radius = _trimesh("nsphere").minimum_nsphere(points)
+    pose = np.eye(4)
+    pose[:3, 3] = center
+    return Geometry(SphereShape(float(radius)), pose)
+
+
+def _cylinder(points: Matrix) -> Geometry:
+    found = _trimesh("bounds").minimum_cylinder(points)
+    return Geometry(CylinderShape(float(found["radius"]), float(found["height"])), _rigid(found["transform"]))
+
+
+def _capsule(points: Matrix) -> Geometry:
+    """About the cylinder's axis, with its radius; the balls are as close together as the points let them."""
+    cylinder = _cylinder(points)
+    assert isinstance(cylinder.shape, CylinderShape)
+    local = moved(inverse(cylinder.pose), points)
+    across = (local[:, :2] ** 2).sum(1)
+    radius = max(cylinder.shape.radius, float(np.sqrt(across.max())))
+    rise = np.sqrt(np.maximum(radius**2 - across, 0))
+    top, bottom = float((local[:, 2] - rise).max()), float((local[:, 2] + rise).min())
+    pose = cylinder.pose.copy()
+    pose[:3, 3] += pose[:3, 2] * (top + bottom) / 2
+    return Geometry(CapsuleShape(radius, max(top - bottom, 0.0)), pose)
+
+
+_FITS: dict[str, Callable[[Matrix], Geometry]] = {
+    "sphere": _sphere,
+    "box": _box,
+    "capsule": _capsule,
+    "cylinder": _cylinder,
+}
+
+
+def _trimesh(part: str) -> Any:
+    """Imported when it is needed: it takes as long as all else together."""
+    return import_module(f"trimesh.{part}")
+
+
+def _rigid(pose: Matrix) -> Matrix:
+    """The rigid motion closest to a matrix that is one but for rounding, or mirrors: turned the right way round."""
+    u, _, v = np.linalg.svd(pose[:3, :3])
+    rotation = u @ v
+    if np.linalg.det(rotation) < 0:
+        rotation[:, 0] = -rotation[:, 0]  # the bodies are symmetric
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = rotation, pose[:3, 3]
+    return result

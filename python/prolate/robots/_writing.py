@@ -1,0 +1,98 @@
+"""What all writers share: numbers as text, rotations, meshes, and files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Union
+from xml.etree import ElementTree
+
+import numpy as np
+
+from .._bake_many import _write as write_atomically
+from .._errors import Error, path_of
+from ._model import Matrix, MeshShape
+
+
+def text(*values: float) -> str:
+    """Numbers with all their digits: what reads them as doubles has the same ones."""
+    return " ".join(repr(float(value)) for value in values)
+
+
+def quaternion(rotation: Matrix) -> tuple[float, float, float, float]:
+    """``w x y z`` of a rotation matrix, by the eigenvector that no rounding spoils (Bar-Itzhack 2000)."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
+    symmetric = np.array([
+        [xx - yy - zz, yx + xy, zx + xz, zy - yz],
+        [yx + xy, yy - xx - zz, zy + yz, xz - zx],
+        [zx + xz, zy + yz, zz - xx - yy, yx - xy],
+        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+    ])  # fmt: skip
+    x, y, z, w = (float(one) for one in np.linalg.eigh(symmetric)[1][:, -1])
+    return (w, x, y, z) if w >= 0 else (-w, -x, -y, -z)
+
+
+def roll_pitch_yaw(rotation: Matrix) -> tuple[float, float, float]:
+    """Angles about the fixed axes x, y and z, in this order; radians."""
+    across = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    pitch = float(np.arctan2(-rotation[2, 0], across))
+    if across < 1e-9:  # looking along z: only the sum or the difference of the other two matters
+        return float(np.arctan2(-rotation[1, 2], rotation[1, 1])), pitch, 0.0
+    roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    return roll, pitch, float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
+@dataclass
+class Files:
+    """Files that belong together: written when all are ready, and ``path``, which names the others, last."""
+
+    path: Path
+    contents: dict[Path, bytes] = field(default_factory=dict)
+    _meshes: dict[tuple[int, int], str] = field(default_factory=dict)
+    _names: set[str] = field(default_factory=set)
+
+    @classmethod
+    def at(cls, path: Union[str, os.PathLike[str]]) -> Files:
+        return cls(Path(path_of("path", path)))
+
+    def mesh(self, name: str, shape: MeshShape) -> str:
+        """The name, relative to ``path``, of an OBJ file of this mesh; shapes of the same arrays share one.
+
+        It has no ``o`` and no ``g``: several targets read only the first part of a file that has.
+        """
+        key = (id(shape.vertices), id(shape.faces))
+        if key not in self._meshes:
+            safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
+            relative = f"{self.path.stem}_meshes/{unique(safe, self._names)}.obj"
+            lines = [f"v {text(*vertex)}" for vertex in shape.vertices]
+            lines += [f"f {a} {b} {c}" for a, b, c in (shape.faces + 1).tolist()]
+            self.contents[self.path.parent / relative] = ("\n".join(lines) + "\n").encode()
+            self._meshes[key] = relative
+        return self._meshes[key]
+
+    def xml(self, root: ElementTree.Element, comment: str) -> None:
+        """An element a line: PyBullet cuts lines at 8191 bytes."""
+        ElementTree.indent(root)
+        body = ElementTree.tostring(root, encoding="unicode")
+        self.contents[self.path] = f'<?xml version="1.0"?>\n<!-- {comment} -->\n{body}\n'.encode()
+
+    def write(self) -> None:
+        """Raises Error, ``code`` ``"io"``."""
+        last = self.contents[self.path]
+        others = [item for item in self.contents.items() if item[0] != self.path]
+        for path, content in [*others, (self.path, last)]:
+            try:
+                write_atomically(os.fspath(path.absolute()), content)
+            except OSError as error:
+                raise Error(f"{error.strerror}: {path}", "io", error.errno or 0) from None
+
+
+def unique(name: str, taken: set[str]) -> str:
+    """The name, with a number behind it if it is taken; it is taken from then on."""
+    found, count = name, 1
+    while found in taken:
+        count += 1
+        found = f"{name}_{count}"
+    taken.add(found)
+    return found

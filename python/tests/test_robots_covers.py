@@ -1,0 +1,165 @@
+"""Covers of robots: that they hold what they must, stick out by no more than they say, and are chosen as documented."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from robot_parts import arm, distance_to_l, l_shape, points_of_l, pose, wedge
+
+from prolate.robots._covers import SINGLE, Options, Solid
+from prolate.robots._fits import around, hull_within
+from prolate.robots._measure import beyond, farthest
+from prolate.robots._model import BoxShape, EllipsoidShape, Geometry, Link, MeshShape
+from prolate.robots._proof import holds_ellipsoids, holds_points
+from prolate.robots._robot import Robot
+from prolate.robots._solids import grown, inverse, moved, polyhedron, volume
+
+
+def cloud(seed: int) -> np.ndarray:
+    """Points of a bent, tapered part."""
+    random = np.random.default_rng(seed)
+    return moved(pose(seed), random.normal(size=(300, 3)) * [0.2, 0.05, 0.03] ** random.uniform(0.9, 1.1, (300, 1)))
+
+
+@pytest.mark.parametrize("kind", SINGLE)
+@pytest.mark.parametrize("seed", range(4))
+def test_fits_hold_their_points(kind: str, seed: int) -> None:
+    points = cloud(seed)
+    body = around(points, kind)
+    assert holds_points(body, points)
+    # A polyhedron around the body has all of its points; by volume it is hardly larger.
+    vertices, faces = polyhedron(body.shape)
+    assert 1 - 1e-12 <= volume(MeshShape(vertices, faces)) / volume(body.shape) <= 1.05
+    assert not holds_points(grown(body, -1e-6), points)
+
+
+@pytest.mark.parametrize("most", [8, 16, 32])
+def test_hulls_of_few_vertices_hold_the_points_from_outside(most: int) -> None:
+    sizes = []
+    for seed in range(4):
+        random = np.random.default_rng(seed)
+        points = random.normal(size=(400, 3))
+        points = moved(pose(seed), points / np.linalg.norm(points, axis=1)[:, None] * [0.3, 0.2, 0.1])
+        hull = hull_within(points, most)
+        assert isinstance(hull.shape, MeshShape) and len(hull.shape.vertices) <= most
+        assert holds_points(grown(hull, 1e-12), points)
+        sizes.append(volume(hull.shape) / volume(around(points, "box").shape))
+    assert max(sizes) <= 1.001  # a box is a hull of eight
+
+
+def test_hulls_of_few_enough_vertices_are_exact() -> None:
+    hull = hull_within(l_shape().vertices, 16)
+    assert volume(hull.shape) == pytest.approx(0.1 * (0.3 * 0.4 - 0.2 * 0.3 / 2))
+
+
+def test_the_proof_of_ellipsoids_sees_a_millionth() -> None:
+    solid = Solid(Link("one"), [Geometry(l_shape(), pose(1))], Options(quality="fast"))
+    cover = solid.leaves(ellipsoids=6)
+    assert cover.tree is not None and cover.proved
+    inner = cover.tree.cut()
+    assert holds_ellipsoids(cover.geometries, inner, solid.rounding)
+    shift = np.zeros((4, 4))
+    shift[:3, 3] = 1e-6
+    for change in (
+        lambda one: replace(one, shape=EllipsoidShape(tuple(r * (1 - 1e-5) for r in one.shape.radii))),
+        lambda one: replace(one, pose=one.pose @ pose(3, 0)),
+        lambda one: replace(one, pose=one.pose + shift),
+    ):
+        spoiled = list(cover.geometries)
+        spoiled[3] = change(spoiled[3])
+        assert not holds_ellipsoids(spoiled, inner, solid.rounding)
+    assert not holds_ellipsoids(cover.geometries[1:], inner, solid.rounding)
+
+
+@pytest.mark.parametrize("only", [None, "ellipsoids", "spheres", "hull", "box", "capsule", "cylinder", "sphere"])
+def test_covers_hold_all_points_and_say_how_far_they_stick_out(only: str | None, bakes: Path) -> None:
+    robot = Robot(arm()).bake(clearance=0.1, only=only, cache=bakes)
+    assert robot.proved and list(robot.covers) == ["base", "elbow", "hand"]
+    cover, place = robot.covers["base"], pose(1)
+    assert (beyond(cover.geometries, moved(place, points_of_l(4000))) <= 0).all()
+    around_it = moved(place, np.random.default_rng(2).uniform(-0.4, 0.8, (40000, 3)))
+    inside = around_it[beyond(cover.geometries, around_it) <= 0]
+    farthest = distance_to_l(moved(inverse(place), inside)).max()
+    assert farthest <= cover.clearance <= 1.5 * farthest
+    assert (cover.clearance <= 0.1) == (only in (None, "ellipsoids", "spheres"))
+    assert cover.kind == (only or "ellipsoids")
+    assert ("base" in [note.link for note in robot.notes]) == (cover.clearance > 0.1)
+
+
+def test_what_is_convex_gets_its_hull_and_primitives_stay(bakes: Path) -> None:
+    robot = Robot(arm()).bake(clearance="10cm", finer={"elbow": "5mm"}, cache=bakes)
+    elbow = robot.covers["elbow"]
+    assert elbow.kind == "hull" and elbow.outside_ratio < 1e-3 and elbow.clearance <= 0.005
+    assert elbow.geometries[0] is robot.description.links[1].collisions[1]
+    assert robot.covers["base"].kind == "ellipsoids"
+    rounder = Robot(arm()).bake(only="spheres", clearance=0.1, cache=bakes).covers["elbow"]
+    assert rounder.kind == "spheres" and not any(isinstance(one.shape, BoxShape) for one in rounder.geometries)
+
+
+def test_a_budget_is_kept_and_spent_where_it_gains(bakes: Path) -> None:
+    few, many = (Robot(arm()).bake(ellipsoids=count, cache=bakes) for count in (4, 20))
+    for robot, count in ((few, 4), (many, 20)):
+        assert robot.proved and sum(cover.cost for cover in robot.covers.values()) <= count
+    assert len(few.covers["elbow"].geometries) == len(many.covers["elbow"].geometries) == 2  # nothing can gain there
+    assert few.covers["base"].kind == "hull" and len(many.covers["base"].geometries) == 16
+    assert many.covers["base"].outside_volume < few.covers["base"].outside_volume
+
+
+def test_farthest_is_a_bound_and_not_a_loose_one() -> None:
+    solid = Solid(Link("one"), [Geometry(l_shape())], Options())
+    hull = hull_within(solid.vertices, 16)
+    true = 0.12  # of (0.22, 0.22) from both arms
+    assert true <= farthest([hull], solid.exact) <= 1.03 * true
+    assert farthest([hull], solid.exact, 1.03 * true) <= 1.03 * true
+    assert farthest([hull], solid.exact, 0.97 * true) > 0.97 * true
+
+
+def test_the_cache_gives_the_same_covers_and_believes_nothing_damaged(tmp_path: Path) -> None:
+    robot = Robot(arm())
+    first = robot.bake(clearance=0.1, cache=tmp_path)
+    again = robot.bake(clearance=0.1, cache=tmp_path)
+    for name, cover in first.covers.items():
+        for one, other in zip(cover.geometries, again.covers[name].geometries):
+            assert np.array_equal(one.pose, other.pose)
+            if not isinstance(one.shape, MeshShape):
+                assert one.shape == other.shape
+        assert again.covers[name].tree == cover.tree
+    entries = list(tmp_path.glob("*.covers"))
+    assert len(entries) == 3
+    for entry in entries:
+        entry.write_bytes(entry.read_bytes().replace(b"0.1", b"0.2", 1))
+    mended = robot.bake(clearance=0.1, cache=tmp_path)
+    assert mended.proved and mended.covers["base"].clearance == first.covers["base"].clearance
+
+
+def test_a_link_that_cannot_be_baked_does_not_stop_the_others() -> None:
+    description = arm()
+    broken = MeshShape(wedge().vertices, np.array([[0, 1, 99]]))
+    links = (replace(description.links[0], collisions=(Geometry(broken),)), *description.links[1:])
+    for goal in ({"clearance": 0.02}, {"ellipsoids": 12}, {"exact": True}):
+        robot = Robot(replace(description, links=links)).bake(**goal, only="hull")
+        assert list(robot.covers) == ["elbow", "hand"] and not robot.proved
+        assert [note.link for note in robot.notes if note.kind == "error"] == ["base"]
+
+
+def test_exact_trees_are_of_all_geometries() -> None:
+    robot = Robot(arm()).bake(exact=True)
+    assert robot.proved and all(cover.tree.has_triangles for cover in robot.covers.values())
+    assert len(robot.covers["elbow"].tree.mesh.faces) == 4 + 12
+
+
+def test_bad_arguments() -> None:
+    robot = Robot(arm())
+    with pytest.raises(ValueError, match="only one of them"):
+        robot.bake(clearance=0.1, exact=True)
+    with pytest.raises(ValueError, match="'cone' is none of"):
+        robot.bake(only="cone")
+    with pytest.raises(ValueError, match="8 or more"):
+        robot.bake(max_hull_vertices=4)
+    with pytest.raises(ValueError, match=r"finer\['hand'\]"):
+        robot.bake(finer={"hand": "5 miles"})
+    with pytest.raises(ValueError, match="no link"):
+        robot.bake(finer={"foot": 0.001})
