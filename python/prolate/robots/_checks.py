@@ -141,7 +141,7 @@ class Checks:
         ValueError, TypeError
             Naming the configuration: a shape that does not fit, a number that is not finite, a quaternion of 0.
         """
-        return self._native(scene).collide(q, not first_only, threads) != 0
+        return self._native(scene).collide(q, not first_only, threads).astype(np.bool_)
 
     def distance(
         self,
@@ -205,7 +205,8 @@ class Checks:
         ValueError, TypeError
             As :meth:`collide`.
         """
-        return self.motion_verdicts(q0, q1, scene, depth=depth, budget=budget, threads=threads) == 0
+        verdicts = self.motion_verdicts(q0, q1, scene, depth=depth, budget=budget, threads=threads)
+        return np.logical_not(verdicts)  # SEPARATED is 0
 
     def motion_verdicts(
         self,
