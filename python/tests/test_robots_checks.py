@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,19 @@ import pytest
 
 import prolate
 from conftest import matrix
-from prolate.robots import Checks, Description, Joint, Kinematics, Link, Mimic, PointCloud, Scene
+from prolate.robots import (
+    BoxShape,
+    Checks,
+    Description,
+    Geometry,
+    Joint,
+    Kinematics,
+    Link,
+    Mimic,
+    PointCloud,
+    Robot,
+    Scene,
+)
 
 KINDS = ("revolute", "prismatic", "continuous", "planar", "planar", "planar", "ball", "floating", "fixed", "revolute")
 
@@ -370,3 +383,16 @@ def test_trees_of_unknown_links_are_refused():
     description, halves = arm(np.random.default_rng(5))
     with pytest.raises(ValueError, match="no link l9"):
         Checks(description, {"l9": prolate.box_tree(halves[0])})
+
+
+def test_baked_robots_answer(among_boxes):
+    checks, scene, q, _, gaps = among_boxes
+    description, halves = arm(np.random.default_rng(5))
+    links = [replace(k, collisions=(Geometry(BoxShape(tuple(2 * h))),)) for k, h in zip(description.links, halves)]
+    baked = Robot(replace(description, links=tuple(links))).bake(exact=True)
+    least = gaps.min(axis=1)
+    assert (baked.collide(q, scene) == (least <= 0))[np.abs(least) > 1e-6].all()
+    assert (baked.fk(q) == checks.fk(q)).all()
+    assert np.abs(baked.distance(q, scene).lower - checks.distance(q, scene).lower).max() < 1e-6
+    short = q + 0.02 * (q[::-1] - q)
+    assert (baked.validate_motion(q, short, scene) == checks.validate_motion(q, short, scene)).mean() > 0.99

@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 from .. import Tree, bake
+from ._checks import Checks, RobotDistances
 from ._covers import cost_of
 from ._model import Description, Geometry, Link, Note, PlaneShape
 from ._solids import merged
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+    from ._scene import Scene
 
 
 def is_solid(link: Link) -> bool:
@@ -83,6 +91,30 @@ class BakedRobot:
         """Is every link covered, and proved to be?"""
         complete = all(link.name in self.covers for link in self.description.links if is_solid(link))
         return complete and all(cover.proved for cover in self.covers.values())
+
+    @cached_property
+    def checks(self) -> Checks:
+        """What planners ask. Made when it is first asked for; ``Checks(...)`` itself takes pairs that may touch."""
+        trees = {name: cover.tree for name, cover in self.covers.items()}
+        return Checks(self.description, trees, slack={name: cover.rounding for name, cover in self.covers.items()})
+
+    def fk(self, q: ArrayLike, **options: Any) -> NDArray[np.float64]:
+        """:meth:`Checks.fk`."""
+        return self.checks.fk(q, **options)
+
+    def collide(self, q: ArrayLike, scene: Scene | None = None, **options: Any) -> NDArray[np.bool_]:
+        """:meth:`Checks.collide`."""
+        return self.checks.collide(q, scene, **options)
+
+    def distance(self, q: ArrayLike, scene: Scene | None = None, **options: Any) -> RobotDistances:
+        """:meth:`Checks.distance`."""
+        return self.checks.distance(q, scene, **options)
+
+    def validate_motion(
+        self, q0: ArrayLike, q1: ArrayLike, scene: Scene | None = None, **options: Any
+    ) -> NDArray[np.bool_]:
+        """:meth:`Checks.validate_motion`."""
+        return self.checks.validate_motion(q0, q1, scene, **options)
 
     def table(self) -> str:
         """A line of text for each link: kind, bodies, outside ratio, distances, proof."""
