@@ -67,3 +67,74 @@ def test_exit_codes(tmp_path, monkeypatch, capsys, words, code, said):
     except SystemExit as exit:
         assert exit.code == code
     assert said in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """Of all tests, so that each cover is made once."""
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def bodies(tmp_path, monkeypatch, cache):
+    """A robot of a primitive, which is its own cover, and a mesh that is convex."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "part.obj").write_text(TETRAHEDRON)
+    (tmp_path / "robot.urdf").write_text(ROBOT.replace("package://parts/", ""))
+
+
+def test_bake_covers_and_keeps_what_it_did(bodies, cache, capsys):
+    pytest.importorskip("scipy")
+    assert main(["bake", "robot.urdf", "--clearance", "5mm"]) == 0
+    table = capsys.readouterr().out
+    assert [line.split()[0] for line in table.splitlines()] == ["link", "a", "b"] and table.count("yes") == 2
+    assert list((cache / "prolate" / "robots").iterdir())
+    assert main(["bake", "robot.urdf", "--clearance", "0.005"]) == 0 and capsys.readouterr().out == table
+
+
+@pytest.mark.parametrize(
+    ("words", "begins"),
+    [
+        (["-o", "out.xml"], "<mujoco"),
+        (["-o", "out.sdf"], "<sdf"),
+        (["-o", "out.urdf"], "<robot"),
+        (["-o", "out", "--to", "drake"], "<robot"),
+        (["-o", "out.yaml", "--only", "spheres"], "collision_spheres"),
+    ],
+)
+def test_convert_writes_each_format(bodies, tmp_path, capsys, words, begins):
+    pytest.importorskip("scipy")
+    assert main(["convert", "robot.urdf", *words]) == 0
+    assert begins in (tmp_path / words[1]).read_text()
+    assert "proved" in capsys.readouterr().out
+
+
+def test_convert_writes_nothing_if_a_link_fails(bodies, tmp_path, capsys):
+    pytest.importorskip("scipy")
+    assert main(["convert", "robot.urdf", "-o", "out.foo"]) == 2
+    assert "say which with --to" in capsys.readouterr().err
+    (tmp_path / "part.obj").unlink()
+    assert main(["convert", "robot.urdf", "-o", "out.xml"]) == 1
+    said = capsys.readouterr().err
+    assert "part.obj" in said and "out.xml: not written" in said
+    assert not (tmp_path / "out.xml").exists()
+
+
+def test_touch_writes_srdf(bodies, tmp_path, capsys):
+    pytest.importorskip("scipy")
+    assert main(["touch", "robot.urdf", "--samples", "100", "-o", "robot.srdf"]) == 0
+    assert "0 pairs, beside 1 of neighbours, in 100 samples" in capsys.readouterr().out
+    assert 'link1="a" link2="b" reason="Adjacent"' in (tmp_path / "robot.srdf").read_text()
+    assert main(["info", "robot.urdf", "--srdf", "robot.srdf"]) == 0
+    assert "1 pairs of links are never in contact" in capsys.readouterr().out
+
+
+def test_options_that_exclude_each_other(bodies, capsys):
+    with pytest.raises(SystemExit) as exit:
+        main(["bake", "robot.urdf", "--ellipsoids", "20", "--exact"])
+    assert exit.value.code == 2
+    assert main(["bake", "robot.urdf", "--mend", "2", "--exact"]) == 2
+    assert "--mend: begins with a --clearance" in capsys.readouterr().err
+    assert main(["bake", "robot.urdf", "--clearance", "5miles"]) == 2
+    assert "--clearance: must be metres" in capsys.readouterr().err

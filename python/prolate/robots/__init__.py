@@ -1,6 +1,7 @@
 """Robots: a description in, covers and checks out. docs/robots.md is the tour.
 
-:func:`load` reads a description, :class:`Robot` covers it, and ``write_...`` write what simulators and planners read.
+:func:`load` reads a description, :class:`Robot` covers it, :func:`touches` tells which links touch, and ``write_...``
+write what simulators and planners read.
 It needs ``pip install 'prolate[robots]'``.
 """
 
@@ -30,6 +31,7 @@ from ._robot import Robot
 from ._scene import PointCloud, Scene
 from ._to_coal import geometry_model
 from ._to_newton import add_to_newton
+from ._touch import PairTouch, Touches, mend, touches
 from ._write_mjcf import write_mjcf
 from ._write_sdf import write_sdf
 from ._write_spheres import write_spheres
@@ -54,16 +56,20 @@ __all__ = [
     "Mimic",
     "Note",
     "Pair",
+    "PairTouch",
     "PlaneShape",
     "PointCloud",
     "Robot",
     "RobotDistances",
     "Scene",
     "SphereShape",
+    "Touches",
     "Where",
     "add_to_newton",
     "geometry_model",
     "load",
+    "mend",
+    "touches",
     "write_mjcf",
     "write_sdf",
     "write_spheres",
