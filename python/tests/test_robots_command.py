@@ -93,6 +93,18 @@ def test_bake_covers_and_keeps_what_it_did(bodies, cache, capsys):
     assert main(["bake", "robot.urdf", "--clearance", "0.005"]) == 0 and capsys.readouterr().out == table
 
 
+def test_links_of_the_same_mesh_share_what_is_kept(bodies, tmp_path, capsys):
+    pytest.importorskip("scipy")
+    text = (tmp_path / "robot.urdf").read_text()
+    mesh = '<mesh filename="part.obj" scale="1 1 2"/>'
+    (tmp_path / "robot.urdf").write_text(text.replace('<sphere radius="0.5"/>', mesh))
+    for goal in (["--clearance", "0.005"], ["--ellipsoids", "20", "--only", "hull"]):
+        for _ in range(2):
+            assert main(["bake", "robot.urdf", *goal]) == 0
+            rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
+            assert [row[0] for row in rows] == ["a", "b"] and rows[0][1:] == rows[1][1:]
+
+
 @pytest.mark.parametrize(
     ("words", "begins"),
     [

@@ -44,13 +44,13 @@ class Job:
                 if found is None:
                     found = [self._chosen(link, limits[link.name])]
                     keep(self.options.cache, key, found)
-                self._add(found[0], link)
+                self._add(replace(found[0], name=link.name), link)  # another link may have the same meshes
                 self._warn(link, limits[link.name])
         return self._done()
 
     def by_budget(self, budget: float) -> BakedRobot:
         """All links together."""
-        key = key_of(self.links, (budget, self.options))
+        key = key_of(self.links, (budget, [link.name for link in self.links], self.options))
         found = find(self.options.cache, key)
         if found is None:
             begun = [self._begun(link) for link in self.links if self._meant(link)]
