@@ -32,6 +32,7 @@ from ._scene import PointCloud, Scene
 from ._to_coal import geometry_model
 from ._to_newton import add_to_newton
 from ._touch import PairTouch, Touches, mend, touches
+from ._view import view_page, write_view
 from ._write_mjcf import write_mjcf
 from ._write_sdf import write_sdf
 from ._write_spheres import write_spheres
@@ -70,8 +71,10 @@ __all__ = [
     "load",
     "mend",
     "touches",
+    "view_page",
     "write_mjcf",
     "write_sdf",
     "write_spheres",
     "write_urdf",
+    "write_view",
 ]

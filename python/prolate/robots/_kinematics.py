@@ -54,6 +54,17 @@ class Kinematics:
         """How many numbers a configuration has."""
         return self.description.nq
 
+    @property
+    def home(self) -> NDArray[np.float64]:
+        """Where q begins, (nq,): what the description says, or zeros and no rotation."""
+        if self.description.home:
+            return np.array(self.description.home, dtype=np.float64)
+        out = np.zeros(self.nq)
+        for joint, first in coordinates_of(self.description):
+            if joint.kind in ("ball", "floating"):
+                out[first + joint.coordinates - 1] = 1
+        return out
+
     def fk(self, q: ArrayLike, *, threads: int = 1) -> NDArray[np.float64]:
         """The frames of all links.
 
@@ -85,7 +96,7 @@ class Kinematics:
         """
         rng = np.random.default_rng(seed)
         out = np.empty((count, self.nq))
-        for joint, first in _coordinates(self.description):
+        for joint, first in coordinates_of(self.description):
             if joint.kind in ("ball", "floating"):
                 first_turn = first + (3 if joint.kind == "floating" else 0)
                 out[:, first:first_turn] = rng.uniform(-1, 1, (count, first_turn - first))
@@ -100,7 +111,7 @@ class Kinematics:
         return out
 
 
-def _coordinates(description: Description) -> list[tuple[Joint, int]]:
+def coordinates_of(description: Description) -> list[tuple[Joint, int]]:
     """The joints that have coordinates, and where in q these begin."""
     out, first = [], 0
     for joint in description.joints:
@@ -114,12 +125,12 @@ def _columns(description: Description) -> tuple[Any, ...]:
     """The joints as _core.Robot takes them: kind, parent, child, coordinate, origin, axis, anchor, scale and offset."""
     index = {link.name: i for i, link in enumerate(description.links)}
     joints = {joint.name: joint for joint in description.joints}
-    first = {joint.name: at for joint, at in _coordinates(description)}
+    first = {joint.name: at for joint, at in coordinates_of(description)}
     rows = description.joints
     scales = np.array([[1.0, 0.0]] * len(rows)).reshape(-1, 2)
     coordinates = np.zeros(len(rows), np.int64)
     for i, joint in enumerate(rows):
-        source, scale, offset = _source(joint, joints)
+        source, scale, offset = source_of(joint, joints)
         coordinates[i] = first.get(source.name, 0)
         scales[i] = scale, offset - joint.zero
     return (
@@ -139,7 +150,7 @@ def _axis(joint: Joint) -> tuple[float, float, float]:
     return joint.axis if joint.kind not in ("ball", "floating", "fixed") else (0.0, 0.0, 1.0)
 
 
-def _source(joint: Joint, joints: dict[str, Joint]) -> tuple[Joint, float, float]:
+def source_of(joint: Joint, joints: dict[str, Joint]) -> tuple[Joint, float, float]:
     """The joint whose coordinate moves this one, and its multiplier and offset."""
     scale, offset, source = 1.0, 0.0, joint
     for _ in joints:

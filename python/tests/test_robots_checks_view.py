@@ -1,0 +1,117 @@
+"""The page of a robot: what it computes by itself, run by node, against the library."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conftest import box_mesh, matrix
+from prolate.robots import (
+    BoxShape,
+    CapsuleShape,
+    CylinderShape,
+    Description,
+    Geometry,
+    Joint,
+    Link,
+    MeshShape,
+    Robot,
+    SphereShape,
+    view_page,
+)
+
+# What the script finds in a browser: a document that holds the robot, and a picture that takes everything.
+BROWSER = """
+const any = new Proxy(function () {}, {
+  get: (target, key) => (key === Symbol.toPrimitive ? () => 1 : key === Symbol.iterator ? function* () {} : any),
+  apply: () => any, set: () => true,
+});
+const document = {getElementById: (id) => (id === 'robot' ? {textContent: ROBOT} : any), createElement: () => any};
+const window = any, location = {hash: ''};
+"""
+REPORT = """
+console.log(JSON.stringify(CONFIGURATIONS.map((q) => ({frames: framesOf(q), pairs: touchingPairs(framesOf(q))}))));
+"""
+
+
+def robot_of(shapes, kinds):
+    """A chain of one shape a link, turned and moved in its link's frame."""
+    rng = np.random.default_rng(3)
+
+    def pose(spread):
+        q = rng.normal(size=4)
+        return matrix([*rng.normal(size=3) * spread, *q / np.linalg.norm(q)])
+
+    links = tuple(Link(f"l<{i}>", (Geometry(shape, pose(0.05)),)) for i, shape in enumerate(shapes))
+    joints = []
+    for i, kind in enumerate(kinds):
+        axis = rng.normal(size=3)
+        joints.append(
+            Joint(f"j{i}", kind, links[i].name, links[i + 1].name, pose(0.08), tuple(axis / np.linalg.norm(axis)),
+                  tuple(rng.normal(size=3) * 0.1), zero=0.3 if kind == "revolute" else 0.0, lower=-2, upper=2)
+        )  # fmt: skip
+    return Description("a </script> robot", links, tuple(joints), Path("robot"), "urdf")
+
+
+def hull(size):
+    vertices, faces = box_mesh((size, size, 2 * size))
+    return MeshShape(vertices, faces)
+
+
+@pytest.fixture(scope="module")
+def baked():
+    shapes = [BoxShape((0.2, 0.1, 0.3)), hull(0.1), BoxShape((0.1, 0.3, 0.1)), hull(0.08), BoxShape((0.1, 0.1, 0.2)),
+              CylinderShape(0.1, 0.3), CapsuleShape(0.08, 0.2), SphereShape(0.12)]  # fmt: skip
+    kinds = ("revolute", "planar", "prismatic", "ball", "continuous", "floating", "revolute")
+    return Robot(robot_of(shapes, kinds)).bake(exact=True), Robot(robot_of(shapes, kinds)).bake(clearance=0.01)
+
+
+def test_the_page_holds_the_robot_and_loads_nothing(baked):
+    page = view_page(baked[1])
+    assert page.count("</script>") == 2 and "@ROBOT@" not in page
+    assert not re.search(r'\b(src|href)="(?!data:)', page)
+    data = json.loads(re.search(r'id="robot">(.*?)</script>', page, re.DOTALL)[1])
+    assert data["name"] == "a </script> robot" and len(data["links"]) == 8
+    assert [link["row"][0] for link in data["links"]] == [cover.kind for cover in baked[1].covers.values()]
+    # Covers stick out by no more than they say, and the colours' scale ends there.
+    assert 0 <= data["most"] <= max(cover.clearance for cover in baked[1].covers.values()) + 0.01
+
+
+def test_the_page_computes_what_the_library_does(baked, tmp_path):
+    if shutil.which("node") is None:
+        pytest.skip("no node to run the page's script with")
+    checks = baked[1].checks
+    q = checks.kinematics.random(60, seed=4)
+    q[:, [1, 2, 4, 10, 11, 12]] *= 0.1  # all lengths, so that links meet
+    page = view_page(baked[1])
+    data = re.search(r'id="robot">(.*?)</script>', page, re.DOTALL)[1]
+    script = re.search(r'<script nonce="robot">(.*?)</script>', page, re.DOTALL)[1]
+    program = tmp_path / "page.js"
+    program.write_text(
+        f"const ROBOT = {json.dumps(data)}, CONFIGURATIONS = {json.dumps(q.tolist())};{BROWSER}{script}{REPORT}"
+    )
+    done = subprocess.run(["node", str(program)], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+
+    frames = checks.fk(q)
+    pairs, each = checks.pairs(), checks.collide(q, first_only=False)
+    flat = {f"l<{i}>" for i in range(5)}  # links of flat faces, whose trees are no larger than the bodies
+    touched = 0
+    for i, one in enumerate(found):
+        for link, rows in enumerate(one["frames"]):
+            assert np.abs(np.reshape(rows, (3, 4)) - matrix(frames[link, i])[:3]).max() < 1e-12
+        there = {tuple(pair) for pair in one["pairs"]}
+        for k, pair in enumerate(pairs):
+            meets = (int(pair.link[2:-1]), int(pair.other[2:-1])) in there
+            touched += meets
+            assert each[i, k] or not meets
+            if {pair.link, pair.other} <= flat:
+                assert each[i, k] == meets
+    assert touched > 50
