@@ -87,8 +87,8 @@ def test_what_only_covers_bring_into_contact_is_no_reason_to_exclude(hook):
 
 
 def test_covers_are_mended_where_meshes_do_not_touch(hook):
-    robot, exact, covers = hook
-    mended, found = robots.mend(robot, exact, clearance=0.3, rounds=1, samples=200)
+    _, exact, covers = hook
+    mended, found = robots.mend(exact, covers, rounds=1, samples=200)
     around = next(pair for pair in found.pairs if pair.links == ("hook", "pole"))
     assert around.covers == 0 and mended.proved
     assert mended.covers["hook"].clearance < covers.covers["hook"].clearance

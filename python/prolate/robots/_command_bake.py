@@ -1,4 +1,4 @@
-"""``bake``, ``convert`` and ``touch`` of ``prolate-robot``. What bakes is imported late: ``info`` answers at once."""
+"""``bake``, ``convert``, ``view`` and ``touch`` of ``prolate-robot``."""
 
 from __future__ import annotations
 
@@ -51,6 +51,19 @@ def add_convert(commands: Any) -> None:
     _add_goals(convert)
 
 
+def add_view(commands: Any) -> None:
+    view = add_command(
+        commands,
+        "view",
+        _view,
+        "make a page that shows the robot and its covers",
+        "Writes one page of HTML that needs no network: joints can be moved, links that touch turn red, colours say "
+        "how far covers stick out, and a table lists the links.",
+    )
+    view.add_argument("-o", "--output", metavar="PAGE.html", required=True, help="where to; replaced if it is there")
+    _add_goals(view)
+
+
 def add_touch(commands: Any) -> None:
     touch = add_command(
         commands,
@@ -87,7 +100,7 @@ def _add_goals(parser: argparse.ArgumentParser) -> None:
         metavar="ROUNDS",
         type=int,
         default=0,
-        help="halve the clearance of links that only covers bring into contact, so many times",
+        help="cover links that only covers bring into contact more closely, in so many rounds",
     )
     group.add_argument("--max-hull-vertices", metavar="N", type=int, help="of a hull, 8 or more")
     group.add_argument("--max-ellipsoids", metavar="N", type=int, help="of a link, for a clearance")
@@ -123,12 +136,13 @@ def _baked(robot: Robot, options: argparse.Namespace) -> BakedRobot:
     }
     given = {name: value for name, value in given.items() if value is not None}
     with _Progress(options.quiet) as progress:
+        given.update(threads=options.threads, progress=progress)
+        baked = robot.bake(exact=options.exact, **given)
         if not options.mend:
-            return robot.bake(exact=options.exact, threads=options.threads, progress=progress, **given)
-        if options.exact or options.ellipsoids or options.finer:
-            raise ValueError("--mend: begins with a --clearance, not with --exact, --ellipsoids or --finer")
+            return baked
         exact = robot.bake(exact=True, threads=options.threads)
-        return mend(robot, exact, rounds=options.mend, threads=options.threads, progress=progress, **given)[0]
+        more = {name: value for name, value in given.items() if name not in ("clearance", "ellipsoids", "finer")}
+        return mend(exact, baked, rounds=options.mend, **more)[0]
 
 
 def _metres(option: str, text: str | None) -> float | None:
@@ -179,6 +193,14 @@ def _write(robot: BakedRobot, kind: str, options: argparse.Namespace) -> None:
         write_spheres(robot, options.output)
     else:
         write_urdf(robot, options.output, ellipsoids="drake" if kind == "drake" else "mesh", visuals=visuals)
+
+
+def _view(options: argparse.Namespace) -> int:
+    from ._view import write_view
+
+    robot = _baked(_robot(options, visuals=False), options)
+    write_view(robot, options.output)
+    return _outcome(robot, options.quiet)
 
 
 def _touch(options: argparse.Namespace) -> int:
