@@ -105,12 +105,11 @@ def checks_of(baked: robots.BakedRobot, allowed: Iterable[tuple[str, str]] = ())
     return robots.Checks(baked.description, trees, slack=slack, allowed=allowed)
 
 
-def boxes_around(checks: robots.Checks, rng: np.random.Generator, count: int) -> dict[str, prolate.Box]:
+def boxes_around(checks: robots.Checks, q: np.ndarray, rng: np.random.Generator, count: int) -> dict[str, prolate.Box]:
     """Boxes of half sides of 3 to 15 % of what the robot reaches, turned in all ways.
 
     None that it touches in more than a tenth of its configurations: such a scene would be decided at once.
     """
-    q = checks.kinematics.random(500, 1)
     reach = np.abs(checks.fk(q)[:, :, :3]).max()
     alone = checks.collide(q).mean()
     out: dict[str, prolate.Box] = {}
@@ -121,6 +120,12 @@ def boxes_around(checks: robots.Checks, rng: np.random.Generator, count: int) ->
         if checks.collide(q, robots.Scene().add(box)).mean() - alone < 0.1:
             out[f"box {len(out)}"] = box
     return out
+
+
+def configurations(checks: robots.Checks, count: int, seed: int, spread: float) -> np.ndarray:
+    """Random ones, that part of the way from home. (No robot here has quaternions.)"""
+    home = checks.kinematics.home
+    return home + spread * (checks.kinematics.random(count, seed) - home)
 
 
 def microseconds(call: Callable[[], object], count: int, rounds: int = 3) -> float:
@@ -141,10 +146,10 @@ def compare(name: str, folder: Path, args: argparse.Namespace) -> bool:
     baked = robot.bake(exact=True)
     lone = checks_of(baked)
     # Pairs that touch nearly always are parts of one another; they would decide every configuration.
-    sample = lone.collide(lone.kinematics.random(1000, 4), first_only=False).mean(axis=0)
+    sample = lone.collide(configurations(lone, 1000, 4, args.spread), first_only=False).mean(axis=0)
     always = [pair[:2] for pair, part in zip(lone.pairs(), sample) if part > 0.9]
     exact = checks_of(baked, always)
-    boxes = boxes_around(exact, np.random.default_rng(3), BOXES)
+    boxes = boxes_around(exact, configurations(exact, 500, 1, args.spread), np.random.default_rng(3), BOXES)
     scene = robots.Scene()
     for key, box in boxes.items():
         scene.add(box, name=key)
@@ -153,7 +158,7 @@ def compare(name: str, folder: Path, args: argparse.Namespace) -> bool:
     peer.add_boxes(boxes)
     peer.set_pairs(pairs)
 
-    q = exact.kinematics.random(args.count, 1)
+    q = configurations(exact, args.count, 1, args.spread)
     some = q[:200]
     ours = np.array([[pin.XYZQUATToSE3(pose).homogeneous for pose in link] for link in exact.fk(some)])
     off = np.abs(ours - peer.frames(some)).max()
@@ -166,7 +171,7 @@ def compare(name: str, folder: Path, args: argparse.Namespace) -> bool:
     missed = sum(not found[i] and distance == 0 for i, distance in differ)
     invented = sum(found[i] and distance > NEAR for i, distance in differ)
 
-    many = exact.kinematics.random(100_000, 2)
+    many = configurations(exact, 100_000, 2, args.spread)
     fast = microseconds(lambda: exact.collide(many, scene, threads=1), len(many))
     print(f"{name}: {len(pairs)} pairs of {len(baked.covers)} links and {BOXES} boxes")
     print(f"  frames: off by {off:.1e} m at most")
@@ -188,7 +193,7 @@ def compare(name: str, folder: Path, args: argparse.Namespace) -> bool:
 
 def motions(checks: robots.Checks, scene: robots.Scene, args: argparse.Namespace) -> int:
     """Random motions, a fifth of the way from one random configuration to another, against dense samples."""
-    q0, q1 = checks.kinematics.random(args.motions, 5), checks.kinematics.random(args.motions, 6)
+    q0, q1 = (configurations(checks, args.motions, seed, args.spread) for seed in (5, 6))
     q1 = q0 + 0.2 * (q1 - q0)
     start = time.process_time()
     verdict = checks.motion_verdicts(q0, q1, scene, threads=1)
@@ -211,6 +216,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=2000, help="configurations that Pinocchio is asked about, too")
     parser.add_argument("--clearance", default="", help="covers of this clearance as well, such as 5mm")
     parser.add_argument("--cache", type=Path, help="folder that keeps them")
+    parser.add_argument("--spread", type=float, default=1, help="how far from home configurations are, as part of all")
     parser.add_argument("--motions", type=int, default=200)
     parser.add_argument("--samples", type=int, default=10_000, help="of a motion")
     args = parser.parse_args()

@@ -23,6 +23,7 @@ from prolate.robots import (
     MeshShape,
     Robot,
     SphereShape,
+    render,
     view_page,
 )
 
@@ -115,3 +116,47 @@ def test_the_page_computes_what_the_library_does(baked, tmp_path):
             if {pair.link, pair.other} <= flat:
                 assert each[i, k] == meets
     assert touched > 50
+
+
+def two_boxes():
+    """A box of 0.4 x 0.2 x 0.2 that stands, and a smaller one that slides along x."""
+    links = (Link("a", (Geometry(BoxShape((0.4, 0.2, 0.2))),)), Link("b"), Link("c", (Geometry(BoxShape((0.2,) * 3)),)))
+    joints = (Joint("rest", "fixed", "a", "b"), Joint("x", "prismatic", "b", "c", axis=(1, 0, 0), lower=-1, upper=1))
+    first = Joint("turn", "revolute", "b", "d")
+    last = Link("d", (Geometry(BoxShape((0.01,) * 3)),))
+    return Robot(Description("two", (*links, last), (*joints, first), Path("two"), "urdf")).bake(exact=True)
+
+
+def test_a_picture_shows_what_is_there():
+    robot = two_boxes()
+    # From the side: a spans x from -0.2 to 0.2, c from 0.4 to 0.6, both z from -0.1 to 0.1; white around them.
+    apart = render(robot, [0.5, 0.0], size=(400, 200), view=(-90, 0), covers="none", samples=1)
+    assert apart.shape == (200, 400, 3) and apart.dtype == np.uint8
+    drawn = (apart < 255).any(axis=2)
+    scale = 0.92 * 400 / 0.8
+    columns = np.flatnonzero(drawn.any(axis=0))
+    assert abs(columns[-1] - columns[0] + 1 - 0.8 * scale) <= 2
+    assert abs(drawn.sum() - (0.4 + 0.2) * 0.2 * scale**2) < 500
+    gap = int(200 + (0.3 - 0.2) * scale)  # in the middle between the two
+    assert not drawn[:, gap].any() and drawn[100, gap - 60] and drawn[100, gap + 60]
+
+
+def test_a_picture_is_red_where_links_touch():
+    robot = two_boxes()
+
+    def red(picture):
+        part = picture.astype(int)
+        return (part[..., 0] > 1.8 * part[..., 1]) & (part[..., 0] > 1.8 * part[..., 2])
+
+    options = {"size": (120, 80), "samples": 1, "covers": "none"}
+    assert red(render(robot, [0.0, 0.3], **options)).sum() > 500  # c is around d
+    assert not red(render(robot, [0.5, 0.0], **options)).any()
+    assert (render(robot, size=(20, 10), meshes=False, covers="none") == 255).all()
+    with pytest.raises(ValueError, match="covers: 'red'"):
+        render(robot, covers="red")
+
+
+def test_heat_is_of_the_cover(baked):
+    plain = render(baked[1], size=(60, 40), covers="colour", meshes=False, samples=1)
+    hot = render(baked[1], size=(60, 40), covers="heat", meshes=False, samples=1)
+    assert ((plain < 255).any(axis=2) == (hot < 255).any(axis=2)).all() and (plain != hot).any()

@@ -27,6 +27,7 @@ from ._model import (
     Where,
 )
 from ._read import load
+from ._render import render
 from ._robot import Robot
 from ._scene import PointCloud, Scene
 from ._to_coal import geometry_model
@@ -70,6 +71,7 @@ __all__ = [
     "geometry_model",
     "load",
     "mend",
+    "render",
     "touches",
     "view_page",
     "write_mjcf",

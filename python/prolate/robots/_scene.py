@@ -63,7 +63,7 @@ class Scene:
         ValueError, TypeError
             Naming what is wrong; the scene is then as it was.
         """
-        at = _matrix("pose", _IDENTITY if pose is None else pose)
+        at = matrix_of("pose", _IDENTITY if pose is None else pose)
         self._insert(shape, at)
         self.names.append(name if name is not None else f"{_word(shape)} {len(self.names)}")
         return self
@@ -73,7 +73,7 @@ class Scene:
             self.native.add_tree(shape, at)
         elif isinstance(shape, Box):
             row = numbers(shape)[1]
-            self.native.add_box(row[7:], at @ _matrix("shape.pose", row[:7]))
+            self.native.add_box(row[7:], at @ matrix_of("shape.pose", row[:7]))
         elif isinstance(shape, Sphere):
             row = numbers(shape)[1]
             self.native.add_capsule(np.zeros(3), np.zeros(3), row[3], at @ _shift(row[:3]))
@@ -107,8 +107,8 @@ def _shift(by: ArrayLike) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return out
 
 
-def _matrix(name: str, pose: ArrayLike) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """4x4 of a pose in either form."""
+def matrix_of(name: str, pose: ArrayLike) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """4x4 of a pose in either form; `name` is the argument's."""
     try:
         given = np.asarray(pose, dtype=np.float64)
     except (TypeError, ValueError):

@@ -142,7 +142,7 @@ def _link(link: Link, cover: LinkCover | None) -> dict[str, Any]:
     if cover is None:
         return out
     vertices, faces = merged(cover.geometries)
-    heat = _outside(link, vertices)
+    heat = outside(link, vertices)
     ratio = cover.outside_ratio
     out["parts"] = _tree_parts(cover.tree) if cover.kind == "exact" else [_part(one) for one in cover.geometries]
     out["cover"] = {**_triangles(vertices, faces), "heat": _base64(heat, np.float32)}
@@ -158,7 +158,7 @@ def _link(link: Link, cover: LinkCover | None) -> dict[str, Any]:
     return out
 
 
-def _outside(link: Link, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def outside(link: Link, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far points are outside the link's own bodies, metres; 0 inside."""
     try:
         body = bake(*merged(link.collisions), exact=True)
