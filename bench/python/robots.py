@@ -104,7 +104,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robots", nargs="*", default=list(ROBOTS), help="by default all six")
     parser.add_argument("--budget", type=int, default=200)
-    parser.add_argument("--quality", default="normal")
+    parser.add_argument("--quality", default="fast")
     parser.add_argument("--seconds", type=float, default=1.0, help="of each fall")
     parser.add_argument("--tables", action="store_true", help="a line for each link")
     options = parser.parse_args()

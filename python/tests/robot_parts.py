@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from prolate.robots import BakedRobot, Robot
 from prolate.robots._model import BoxShape, Description, Geometry, Inertial, Joint, Link, MeshShape
 
 L_BOXES = [((0.0, 0.0, 0.0), (0.3, 0.1, 0.1)), ((0.0, 0.1, 0.0), (0.1, 0.4, 0.1))]  # lower and upper corners, metres
@@ -69,6 +70,11 @@ def arm() -> Description:
         Joint("push", "prismatic", "elbow", "hand", pose(7), (0.0, 0.6, 0.8), lower=-0.1, upper=0.2),
     )
     return Description("arm", links, joints, source, "urdf")
+
+
+def baked(only: str | None, cache: Path) -> BakedRobot:
+    """arm() with covers of all kinds or of one, which are so loose that they take little time."""
+    return Robot(arm()).bake(clearance=0.1 if only is None else 0.2, only=only, cache=cache)
 
 
 def frames(description: Description, q: dict[str, float]) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robot_parts import arm, frames, l_shape, points_of_l, pose
+from robot_parts import arm, baked, frames, l_shape, points_of_l, pose
 
 from prolate.robots._model import EllipsoidShape, Geometry, MeshShape, Mimic
 from prolate.robots._robot import Robot
@@ -53,7 +53,7 @@ def covered(model, data, body: str, points: np.ndarray) -> bool:
 @pytest.mark.parametrize("only", [None, "ellipsoids", "spheres", "hull", "box", "capsule", "cylinder", "sphere"])
 def test_mujoco_places_each_cover_around_its_link(only: str | None, bakes: Path, tmp_path: Path) -> None:
     description = arm()
-    robot = Robot(description).bake(clearance=0.1, only=only, cache=bakes)
+    robot = baked(only, bakes)
     model = compiled(robot, tmp_path / "arm.xml")
     data = mujoco.MjData(model)
     data.qpos[:] = [0.7, 0.15]

@@ -57,7 +57,7 @@ class Job:
             solids = [solid for solid in begun if solid is not None]
             spare = budget - sum(len(self._own(link)) for link in self.links)
             covers = by_budget(solids, spare)
-            found = [_measured(solid, cover) for solid, cover in zip(solids, covers)]
+            found = [_measured(solid, cover, solid.farthest(cover)) for solid, cover in zip(solids, covers)]
             if len(solids) == len(begun):
                 keep(self.options.cache, key, found)
         by_name = {cover.name: cover for cover in found}
@@ -78,7 +78,7 @@ class Job:
         if not self._meant(link):
             return LinkCover(link.name, "own", ())
         solid = Solid(link, self._meant(link), self.options)
-        return _measured(solid, by_clearance(solid, limit), limit)
+        return _measured(solid, *by_clearance(solid, limit))
 
     def _begun(self, link: Link) -> Solid | None:
         """A solid that can be baked."""
@@ -121,18 +121,16 @@ class Job:
         return BakedRobot(self.description, self.covers, tuple(self.notes))
 
 
-def _measured(solid: Solid, cover: Cover, limit: float = 0.0) -> LinkCover:
-    farthest = solid.farthest(cover)
-    if farthest > limit and cover.tree is None:  # a bound; the question alone may be answered more finely
-        farthest = min(farthest, max(solid.farthest(cover, limit), limit))
+def _measured(solid: Solid, cover: Cover, clearance: float) -> LinkCover:
     outside = max(cover.volume - solid.volume, 0.0)
+    closed = not solid.exact.info.surface_mode
     return LinkCover(
         name=solid.link.name,
         kind=cover.kind,
         geometries=cover.geometries,
         outside_volume=outside,
-        outside_ratio=outside / solid.volume if solid.volume > 0 else float("nan"),
-        clearance=farthest,
+        outside_ratio=outside / solid.volume if closed and solid.volume > 0 else float("nan"),
+        clearance=clearance,
         mean_distance=mean_distance(cover.geometries, solid.exact, solid.options.threads),
         proved=cover.proved,
         rounding=solid.rounding,

@@ -1,7 +1,7 @@
 """Covers of one link, and which of them to take.
 
 What a cover costs is how long a target takes to ask about it, in ellipsoids: each body counts one, and a convex hull
-one for each 128 vertices that it has, but one at least.
+one for each 256 vertices that it has, but one at least.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ KEEPS: dict[type, set[Kind]] = {
 }  #: a primitive of a link stays what it is if one of these kinds is allowed
 SINGLE: tuple[Kind, ...] = ("box", "capsule", "cylinder", "sphere")
 KINDS: tuple[Kind, ...] = ("hull", *SINGLE, "ellipsoids", "spheres")
-VERTICES_OF_ONE = 128  #: of a hull that costs as much as one ellipsoid
+NEGLIGIBLE = 0.005  #: part of a cover's volume that is not worth a bake
+VERTICES_OF_ONE = 256  #: of a hull that costs as much as one ellipsoid
 
 
 @dataclass(frozen=True)
@@ -146,9 +147,11 @@ class Solid:
         kinds, most = self.options.kinds, self.options.max_hull_vertices
         if not len(self.points):
             return []
-        found = [self._around(kind, around(self.points, kind)) for kind in kinds if kind in SINGLE]
+        found = []
         if "hull" in kinds:
-            found += [self._around("hull", hull_within(self.points, most)), *self._parts()]
+            found = [self._around("hull", hull_within(self.points, most)), *self._parts()]
+        if not found or len(self.points) > most:  # or else no other convex body can be smaller
+            found += [self._around(kind, around(self.points, kind)) for kind in kinds if kind in SINGLE]
         return found
 
     @cached_property
@@ -196,20 +199,22 @@ def _bodies(inner: Ellipsoids, kind: Literal["ellipsoids", "spheres"]) -> Iterat
             yield Geometry(EllipsoidShape((x, y, z)), pose)
 
 
-def by_clearance(solid: Solid, clearance: float) -> Cover:
-    """A cover that sticks out by ``clearance`` (metres) at most, or as little as can be.
+def by_clearance(solid: Solid, clearance: float) -> tuple[Cover, float]:
+    """A cover that sticks out by ``clearance`` (metres) at most, or as little as can be; and how far at most.
 
     One convex body, if one does: that of least :func:`score`. Ellipsoids (or spheres) otherwise, as few as do, or as
     many as there may be.
     """
     convex = sorted((cover for cover in solid.convex if cover.proved), key=lambda cover: score(cover, solid))
     for cover in convex:
-        if solid.farthest(cover, clearance) <= clearance:
-            return cover
+        bound = solid.farthest(cover, clearance)
+        if bound <= clearance:
+            return cover, min(bound, solid.farthest(cover))  # either may be the finer one
     if solid.baked_kind is None and convex:
-        return convex[0]
+        return convex[0], solid.farthest(convex[0])
     least = least_clearance(solid.exact.info.diagonal, solid.options.quality)
-    return solid.leaves(clearance=max(clearance - solid.growth, least), ellipsoids=solid.options.max_ellipsoids)
+    cover = solid.leaves(clearance=max(clearance - solid.growth, least), ellipsoids=solid.options.max_ellipsoids)
+    return cover, solid.farthest(cover)
 
 
 def score(cover: Cover, solid: Solid) -> float:
@@ -249,16 +254,20 @@ def _gain(now: Cover, then: Cover) -> float:
 
 
 def _step(solid: Solid, now: Cover, spare: float) -> Cover | None:
-    """The best of the next few that can be afforded; None if nothing gains."""
-    count = 4
+    """The best of the next few that can be afforded; None if nothing gains.
+
+    The outside volume of n ellipsoids falls about like n^-0.8. So one bake tells how many are worth trying next.
+    """
     options = [cover for cover in solid.convex if cover.proved]
-    if solid.baked_kind is not None:
-        while count <= now.cost:
-            count *= 2
-        while count - now.cost <= spare:
-            options.append(solid.leaves(ellipsoids=count))
-            count *= 2
-            if sum(_gain(now, one) > 0 for one in options if one.cost > now.cost) >= 2:
-                break
+    most = min(int(spare + now.cost), solid.options.max_ellipsoids) if solid.baked_kind else 0
+    outside = max(now.volume - solid.volume, 0.0)
+    count = 8 if now.cost < 8 else 2 * int(now.cost)
+    while count <= most and outside > NEGLIGIBLE * now.volume:
+        found = solid.leaves(ellipsoids=count)
+        options.append(found)
+        enough = count * ((found.volume - solid.volume) / outside) ** 1.25
+        if enough <= count:
+            break
+        count = max(2 * count, int(enough))
     better = [one for one in options if 0 < one.cost - now.cost <= spare and one.volume < now.volume]
     return max(better, key=lambda one: _gain(now, one)) if better else None

@@ -19,7 +19,7 @@ def beyond(cover: Sequence[Geometry], points: Matrix) -> NDArray[np.float64]:
 
 
 def farthest(
-    cover: Sequence[Geometry], solid: Tree, limit: float | None = None, threads: int = 0, cells: int = 40_000
+    cover: Sequence[Geometry], solid: Tree, limit: float | None = None, threads: int = 0, cells: int = 20_000
 ) -> float:
     """An upper bound of how far any point of the cover is from the solid, metres.
 

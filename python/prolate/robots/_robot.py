@@ -34,7 +34,7 @@ class Robot:
         exact: bool = False,
         only: Union[Kind, tuple[Kind, ...], None] = None,
         finer: Mapping[str, Union[str, float]] | None = None,
-        max_hull_vertices: int = 128,
+        max_hull_vertices: int = 256,
         max_ellipsoids: int = 64,
         quality: Literal["fast", "normal", "best"] = "fast",
         cache: Union[str, os.PathLike[str], None] = None,
@@ -47,7 +47,7 @@ class Robot:
         hull for each mesh), or several ellipsoids (or spheres). The goal is one of ``clearance``, ``ellipsoids`` and
         ``exact``; by default a clearance of 5 mm.
 
-        What a cover costs is counted in ellipsoids: each body is one, and a convex hull one for each 128 vertices, but
+        What a cover costs is counted in ellipsoids: each body is one, and a convex hull one for each 256 vertices, but
         at least one.
 
         Parameters

@@ -57,16 +57,16 @@ def _add(builder: Any, body: int, geometry: Geometry, more: dict[str, Any]) -> i
     found: int
     if isinstance(shape, EllipsoidShape):
         a, b, c = shape.radii
-        found = builder.add_shape_ellipsoid(body, place, rx=a, ry=b, rz=c, **more)
+        found = builder.add_shape_ellipsoid(body, xform=place, rx=a, ry=b, rz=c, **more)
     elif isinstance(shape, SphereShape):
-        found = builder.add_shape_sphere(body, place, radius=shape.radius, **more)
+        found = builder.add_shape_sphere(body, xform=place, radius=shape.radius, **more)
     elif isinstance(shape, BoxShape):
         a, b, c = (edge / 2 for edge in shape.size)
-        found = builder.add_shape_box(body, place, hx=a, hy=b, hz=c, **more)
+        found = builder.add_shape_box(body, xform=place, hx=a, hy=b, hz=c, **more)
     elif isinstance(shape, CapsuleShape):
-        found = builder.add_shape_capsule(body, place, radius=shape.radius, half_height=shape.length / 2, **more)
+        found = builder.add_shape_capsule(body, xform=place, radius=shape.radius, half_height=shape.length / 2, **more)
     elif isinstance(shape, CylinderShape):
-        found = builder.add_shape_cylinder(body, place, radius=shape.radius, half_height=shape.length / 2, **more)
+        found = builder.add_shape_cylinder(body, xform=place, radius=shape.radius, half_height=shape.length / 2, **more)
     elif isinstance(shape, MeshShape):
         mesh = import_module("newton").Mesh(shape.vertices, shape.faces.ravel(), compute_inertia=False)
         found = builder.add_shape_convex_hull(body, xform=place, mesh=mesh, **more)
