@@ -45,6 +45,7 @@ def test_python_md(tmp_path, monkeypatch, capsys):
 
 def test_robots_md(tmp_path, monkeypatch):
     pytest.importorskip("lxml")
+    pytest.importorskip("scipy")
     monkeypatch.chdir(tmp_path)
     run("docs/robots.md")
 
