@@ -204,6 +204,7 @@ void RobotChecks::decide_still_pairs() {
 void RobotChecks::place(const double* const (&q)[kLanes], RobotScratch& scratch) const noexcept {
     scratch.frames.resize(robot_.chain.link_count());
     scratch.boxes.resize(robot_.chain.link_count());
+    scratch.tallies.resize(pairs_.size());
     robot_.chain.frames(q, scratch.frames.data());
     for (size_t link = 0; link < robot_.links.size(); ++link)
         if (const auto& body = robot_.links[link]) place_box(*body, scratch.frames[link], scratch.boxes[link]);
@@ -239,9 +240,15 @@ bool RobotChecks::touches(const RobotPair& pair, size_t lane, double margin, con
 
 bool RobotChecks::any_touches(size_t lane, RobotScratch& scratch, QueryContext& context) const noexcept {
     auto& found = scratch.candidates[lane];
-    std::sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.gap < b.gap; });
+    std::vector<Tally>& tallies = scratch.tallies;
+    std::sort(found.begin(), found.end(), [&](const Candidate& a, const Candidate& b) {
+        const float chance_a = tallies[a.pair].chance(), chance_b = tallies[b.pair].chance();
+        return chance_a != chance_b ? chance_a > chance_b : a.gap < b.gap;
+    });
     return std::any_of(found.begin(), found.end(), [&](const Candidate& candidate) {
-        return touches(pairs_[candidate.pair], lane, 0, scratch, context);
+        const bool meet = touches(pairs_[candidate.pair], lane, 0, scratch, context);
+        tallies[candidate.pair].add(meet);
+        return meet;
     });
 }
 

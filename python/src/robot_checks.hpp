@@ -34,8 +34,20 @@ struct Candidate {
     float gap; ///< of the boxes, along one of their axes; negative where they overlap
 };
 
+/// How often a pair was asked lately, and met.
+struct Tally {
+    uint32_t asked = 0, met = 0;
+    void add(bool meet) noexcept {
+        if (asked == 1024) asked /= 2, met /= 2;
+        ++asked, met += meet ? 1 : 0;
+    }
+    /// Its chance to meet (Laplace's rule of succession).
+    float chance() const noexcept { return static_cast<float>(met + 1) / static_cast<float>(asked + 2); }
+};
+
 /// What a thread works in.
 struct RobotScratch {
+    std::vector<Tally> tallies; ///< of the pairs of the checks that were last asked; only the order depends on them
     std::vector<LinkFrames> frames;
     std::vector<PlacedBox<Floats>> boxes; ///< of links
     std::array<std::vector<Candidate>, kLanes> candidates;
