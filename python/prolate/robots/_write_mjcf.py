@@ -29,6 +29,7 @@ from ._model import (
 from ._writing import Files, quaternion, text, unique
 
 _COLLISION, _VISUAL = "collision", "visual"
+_MOST_IN_STL = 200_000  # triangles, for MuJoCo
 
 
 def write_mjcf(
@@ -144,7 +145,7 @@ class _Mjcf:
             vertices = text(*shape.vertices.ravel())
             SubElement(self.asset, "mesh", name=name, vertex=vertices, inertia="shell")
             return name
-        file = self.files.mesh(name, shape)
+        file = self.files.mesh(name, shape, kind="stl" if 4 <= len(shape.faces) <= _MOST_IN_STL else "obj")
         if file not in self.assets:
             self.assets[file] = name
             SubElement(self.asset, "mesh", name=name, file=file, inertia="shell")

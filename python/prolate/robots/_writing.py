@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Union
+from typing import Literal, Union
 from xml.etree import ElementTree
 
 import numpy as np
@@ -56,18 +57,16 @@ class Files:
     def at(cls, path: Union[str, os.PathLike[str]]) -> Files:
         return cls(Path(path_of("path", path)))
 
-    def mesh(self, name: str, shape: MeshShape) -> str:
-        """The name, relative to ``path``, of an OBJ file of this mesh; shapes of the same arrays share one.
+    def mesh(self, name: str, shape: MeshShape, *, kind: Literal["obj", "stl"] = "obj") -> str:
+        """The name, relative to ``path``, of a file of this mesh; shapes of the same arrays share one.
 
-        It has no ``o`` and no ``g``: several targets read only the first part of a file that has.
+        STL is binary, in float32: for what is only seen.
         """
         key = (id(shape.vertices), id(shape.faces))
         if key not in self._meshes:
             safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
-            relative = f"{self.path.stem}_meshes/{unique(safe, self._names)}.obj"
-            lines = [f"v {text(*vertex)}" for vertex in shape.vertices]
-            lines += [f"f {a} {b} {c}" for a, b, c in (shape.faces + 1).tolist()]
-            self.contents[self.path.parent / relative] = ("\n".join(lines) + "\n").encode()
+            relative = f"{self.path.stem}_meshes/{unique(safe, self._names)}.{kind}"
+            self.contents[self.path.parent / relative] = _obj(shape) if kind == "obj" else _stl(shape)
             self._meshes[key] = relative
         return self._meshes[key]
 
@@ -86,6 +85,19 @@ class Files:
                 write_atomically(os.fspath(path.absolute()), content)
             except OSError as error:
                 raise Error(f"{error.strerror}: {path}", "io", error.errno or 0) from None
+
+
+def _obj(shape: MeshShape) -> bytes:
+    """Without ``o`` and ``g``: several targets read only the first part of a file that has these."""
+    lines = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in shape.vertices.tolist()]
+    lines += [f"f {a} {b} {c}\n" for a, b, c in (shape.faces + 1).tolist()]
+    return "".join(lines).encode()
+
+
+def _stl(shape: MeshShape) -> bytes:
+    triangles = np.zeros(len(shape.faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    triangles["corners"] = shape.vertices[shape.faces]
+    return b"by prolate".ljust(80) + struct.pack("<I", len(triangles)) + triangles.tobytes()
 
 
 def unique(name: str, taken: set[str]) -> str:
