@@ -31,6 +31,7 @@ from ._rebase import rebased
 from ._solids import polyhedron
 from ._writing import Files, roll_pitch_yaw, text
 
+_SIDES = 1 / np.cos(np.pi / 32)  #: PyBullet makes a cylinder a prism of 32 sides in it; one larger by this holds it
 _KINDS = {"fixed", "revolute", "continuous", "prismatic", "planar", "floating"}
 
 
@@ -90,16 +91,20 @@ class _Urdf:
             ("visual", link.visuals if self.visuals else ()),
             ("collision", cover.geometries if cover else ()),
         ):
-            for number, one in enumerate(part for whole in geometries for part in self._parts(whole)):
+            parts = (part for whole in geometries for part in self._parts(whole, whole in link.collisions))
+            for number, one in enumerate(parts):
                 found = SubElement(element, tag, name=f"{link.name}_{tag}_{number}")
                 _add_origin(found, one.pose)
                 self._shape(SubElement(found, "geometry"), one, f"{link.name}_{tag}_{number}")
 
-    def _parts(self, geometry: Geometry) -> Iterator[Geometry]:
-        """What URDF can say of it."""
+    def _parts(self, geometry: Geometry, own: bool) -> Iterator[Geometry]:
+        """What URDF can say of it; a cylinder that is a cover, not the link's ``own``, must hold in PyBullet, too."""
         shape = geometry.shape
-        if isinstance(shape, CapsuleShape):
-            yield replace(geometry, shape=CylinderShape(shape.radius, shape.length))
+        wider = 1.0 if own or self.ellipsoids == "drake" else float(_SIDES)
+        if isinstance(shape, CylinderShape):
+            yield replace(geometry, shape=replace(shape, radius=shape.radius * wider))
+        elif isinstance(shape, CapsuleShape):
+            yield replace(geometry, shape=CylinderShape(shape.radius * wider, shape.length))
             for end in (-shape.length / 2, shape.length / 2):
                 pose = geometry.pose.copy()
                 pose[:3, 3] += pose[:3, 2] * end
