@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from robot_parts import arm, baked, frames, points_of_l, pose, wedge
+from robot_parts import arm, baked, frames, l_shape, points_of_l, pose, wedge
 
 import prolate
 from prolate.robots import Robot, load, write_mjcf, write_sdf, write_spheres, write_urdf
 from prolate.robots._measure import beyond
 from prolate.robots._model import BoxShape, EllipsoidShape, Mimic, SphereShape
+from prolate.robots._proof import holds_ellipsoids, holds_points
 from prolate.robots._solids import moved
 from prolate.robots._writing import quaternion, roll_pitch_yaw
 
@@ -129,3 +131,18 @@ def test_rotations_as_text_mean_the_same_matrix() -> None:
             np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]),
         ]
         np.testing.assert_allclose(about[2] @ about[1] @ about[0], matrix, atol=4e-15)
+
+
+@pytest.mark.parametrize("only", ["ellipsoids", "spheres", "hull"])
+@pytest.mark.parametrize("name", ["arm.xml", "arm.sdf", "arm.urdf"])
+def test_the_proof_holds_of_the_numbers_that_are_read_again(name: str, only: str, bakes: Path, tmp_path: Path) -> None:
+    robot = baked(only, bakes)
+    write = {"arm.xml": write_mjcf, "arm.sdf": write_sdf, "arm.urdf": partial(write_urdf, ellipsoids="drake")}[name]
+    write(robot, tmp_path / name)
+    read = {link.name: link.collisions for link in load(tmp_path / name).links}
+    for cover, points in ((robot.covers["base"], l_shape().vertices), (robot.covers["hand"], wedge().vertices)):
+        place = pose(1) if cover.name == "base" else pose(4)
+        if cover.baked is None:
+            assert holds_points(read[cover.name][0], moved(place, points))
+        else:
+            assert holds_ellipsoids(read[cover.name], cover.baked.cut(), cover.rounding)

@@ -180,7 +180,7 @@ class Solid:
         """How far the cover sticks out, metres: a bound; with a ``limit``, just good enough to tell if that is kept."""
         if cover.tree is not None:
             return cover.tree.info.levels[-1].hausdorff_max + self.growth
-        return farthest(cover.geometries, self.exact, limit, self.options.threads)
+        return farthest(cover.geometries, self.exact, limit, self.options.threads, 20_000 if limit is None else 300_000)
 
     def _around(self, kind: Kind, body: Geometry) -> Cover:
         body = grown(body, self.growth)
@@ -210,11 +210,12 @@ def by_clearance(solid: Solid, clearance: float) -> tuple[Cover, float]:
         bound = solid.farthest(cover, clearance)
         if bound <= clearance:
             return cover, min(bound, solid.farthest(cover))  # either may be the finer one
-    if solid.baked_kind is None and convex:
-        return convex[0], solid.farthest(convex[0])
-    least = least_clearance(solid.exact.info.diagonal, solid.options.quality)
-    cover = solid.leaves(clearance=max(clearance - solid.growth, least), ellipsoids=solid.options.max_ellipsoids)
-    return cover, solid.farthest(cover)
+    found = [(cover, solid.farthest(cover)) for cover in convex]
+    if solid.baked_kind is not None or not convex:
+        least = least_clearance(solid.exact.info.diagonal, solid.options.quality)
+        cover = solid.leaves(clearance=max(clearance - solid.growth, least), ellipsoids=solid.options.max_ellipsoids)
+        found.append((cover, solid.farthest(cover)))
+    return min(found, key=lambda one: one[1])
 
 
 def score(cover: Cover, solid: Solid) -> float:

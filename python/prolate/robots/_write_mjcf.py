@@ -112,10 +112,13 @@ class _Mjcf:
         return [link for link in self.description.links if link.name not in moved] + children
 
     def _bounds(self) -> dict[str, str]:
-        """MuJoCo refuses links that move and have no mass."""
-        if all(_is_whole(link.inertial) for link in self.description.links):
-            return {}
-        return {"boundmass": "1e-6", "boundinertia": "1e-9"}
+        """MuJoCo refuses links that move and have no mass, and inertias that no body has."""
+        bounds = {}
+        if not all(_is_whole(link.inertial) for link in self.description.links):
+            bounds = {"boundmass": "1e-6", "boundinertia": "1e-9"}
+        if not all(_is_possible(link.inertial) for link in self.description.links if link.inertial is not None):
+            bounds["balanceinertia"] = "true"
+        return bounds
 
     def _fill(self, body: Element, link: Link) -> None:
         if link.inertial is not None and link.inertial.mass > 0:
@@ -190,6 +193,12 @@ class _Mjcf:
 
 def _is_whole(inertial: Inertial | None) -> bool:
     return inertial is not None and inertial.mass > 0 and bool((np.linalg.eigvalsh(inertial.inertia) > 0).all())
+
+
+def _is_possible(inertial: Inertial) -> bool:
+    """Is no principal moment above the sum of the other two?"""
+    moments = np.linalg.eigvalsh(inertial.inertia)
+    return bool(moments[2] <= moments[0] + moments[1])
 
 
 def _frame(pose: Matrix) -> dict[str, str]:
