@@ -45,7 +45,7 @@ std::array<Point, 2> across(const Point& a) noexcept {
 
 Chain::Chain(nb::handle kinds, nb::handle parents, nb::handle children, nb::handle coordinates, nb::handle origins,
              nb::handle axes, nb::handle anchors, nb::handle scales, size_t link_count, size_t nq)
-    : link_count_(link_count), nq_(nq), joint_of_(link_count, -1), depth_(link_count, 0) {
+    : link_count_(link_count), nq_(nq), joint_of_(link_count, -1) {
     std::vector<uint8_t> kind;
     std::vector<int64_t> parent, child, coordinate;
     std::vector<double> axis, anchor, scale;
@@ -78,7 +78,6 @@ Chain::Chain(nb::handle kinds, nb::handle parents, nb::handle children, nb::hand
                         python::rotated(origin, along)};
         joint.length = length(joint.arm) + length(at);
         joint_of_[c] = static_cast<int64_t>(j);
-        depth_[c] = depth_[p] + 1;
         joints_.push_back(joint);
     }
 }
@@ -89,7 +88,8 @@ namespace {
 struct Step {
     Doubles q[4];
     Doubles3 shift;
-    Doubles far; ///< no less than the shift's length
+    Doubles far;   ///< no less than the shift's length
+    Doubles angle; ///< no less than its size
 };
 
 PROLATE_ROBOT_INLINE Doubles gathered(const double* const (&q)[kLanes], size_t i) {
@@ -98,13 +98,16 @@ PROLATE_ROBOT_INLINE Doubles gathered(const double* const (&q)[kLanes], size_t i
     return out;
 }
 
-PROLATE_ROBOT_INLINE void turn_by(const ChainJoint& joint, const Doubles& angle, Doubles (&q)[4]) {
+PROLATE_ROBOT_INLINE void turn_by(const ChainJoint& joint, const Doubles& angle, Step& step) {
     Doubles s{}, c{};
     for (size_t lane = 0; lane < kLanes; ++lane) {
         s[lane] = std::sin(0.5 * angle[lane]);
         c[lane] = std::cos(0.5 * angle[lane]);
     }
-    for (size_t k = 0; k < 4; ++k) q[k] = c * joint.at_0[k] + s * joint.turn[k];
+    for (size_t k = 0; k < 4; ++k) step.q[k] = c * joint.at_0[k] + s * joint.turn[k];
+    // Of what it is the sum of, too, where it mimics another.
+    const double offset = std::abs(joint.offset);
+    step.angle = (angle < 0 ? -angle : angle) + 2 * offset;
 }
 
 PROLATE_ROBOT_INLINE void shift_by(const ChainJoint& joint, size_t direction, const Doubles& by, Step& step) {
@@ -132,7 +135,7 @@ PROLATE_ROBOT_INLINE Step step_of(const ChainJoint& joint, const double* const (
         break;
     case JointKind::revolute:
     case JointKind::continuous:
-        turn_by(joint, value(), step.q);
+        turn_by(joint, value(), step);
         break;
     case JointKind::prismatic:
         shift_by(joint, 2, value(), step);
@@ -140,7 +143,7 @@ PROLATE_ROBOT_INLINE Step step_of(const ChainJoint& joint, const double* const (
     case JointKind::planar:
         shift_by(joint, 0, gathered(q, joint.coordinate), step);
         shift_by(joint, 1, gathered(q, joint.coordinate + 1), step);
-        turn_by(joint, gathered(q, joint.coordinate + 2), step.q);
+        turn_by(joint, gathered(q, joint.coordinate + 2), step);
         break;
     case JointKind::ball:
         turn_by_quaternion(joint, q, joint.coordinate, step.q);
@@ -167,6 +170,7 @@ PROLATE_ROBOT_CLONES void place(const ChainJoint* joints, size_t count, const do
         child.t = parent.t + rotated(parent.q, arm + step.shift);
         if (joint->anchor != Point{}) child.t = child.t - rotated(child.q, joint->anchor);
         child.extent = parent.extent + (step.far + joint->length);
+        child.steps = parent.steps + (step.angle + 1.0);
     }
 }
 
@@ -178,7 +182,7 @@ bool has_quaternion(const ChainJoint& joint) {
 
 void Chain::frames(const double* const (&q)[kLanes], LinkFrames* out) const noexcept {
     const Doubles zero{};
-    out[0] = {{zero, zero, zero}, {zero, zero, zero, zero + 1.0}, zero};
+    out[0] = {{zero, zero, zero}, {zero, zero, zero, zero + 1.0}, zero, zero};
     place(joints_.data(), joints_.size(), q, out);
 }
 

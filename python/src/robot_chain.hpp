@@ -15,6 +15,7 @@ struct alignas(64) LinkFrames {
     Doubles3 t;     ///< its origin, in the root's frame, metres
     Doubles q[4];   ///< its rotation, x y z w, of length 1 but for rounding
     Doubles extent; ///< the sum of all lengths that led there: its origin is no farther from the root's
+    Doubles steps;  ///< how many joints did, and the sum of their angles
 };
 
 enum class JointKind : uint8_t { fixed, revolute, continuous, prismatic, planar, ball, floating };
@@ -44,23 +45,13 @@ public:
     const ChainJoint* joint_of(size_t link) const noexcept {
         return joint_of_[link] < 0 ? nullptr : &joints_[static_cast<size_t>(joint_of_[link])];
     }
-    /// How many joints are above `link`.
-    size_t depth(size_t link) const noexcept { return depth_[link]; }
-
     /// The frames of all links, into `out`, of the configurations q[lane * nq() ...], all finite.
     void frames(const double* const (&q)[kLanes], LinkFrames* out) const noexcept;
-
-    /// Where rounding in double precision may have moved a point of `link` that is `reach` from its origin.
-    double rounding(size_t link, double extent, double reach) const noexcept {
-        // A joint costs a product of quaternions and two rotated vectors: less than 64 roundings of all lengths so far.
-        return 0x1p-47 * static_cast<double>(depth_[link] + 1) * (extent + reach);
-    }
 
 private:
     size_t link_count_, nq_;
     std::vector<ChainJoint> joints_; ///< parents first
     std::vector<int64_t> joint_of_;
-    std::vector<size_t> depth_;
 };
 
 /// Configurations of a call: shape (N, nq) or (nq,), finite; quaternions of balls and floating bases are no zeros.
@@ -73,6 +64,12 @@ PROLATE_ROBOT_INLINE Doubles3 rotated(const Doubles (&q)[4], const Doubles3& v) 
 PROLATE_ROBOT_INLINE Doubles3 rotated(const Doubles (&q)[4], const Point& p) {
     const Doubles zero{};
     return rotated(q, Doubles3{zero + p[0], zero + p[1], zero + p[2]});
+}
+/// By how much rounding in double precision may have moved a point that is `reach` from the link's origin. A joint
+/// costs a product of quaternions, two rotated vectors, and the rounding of its angle: less than 64 roundings of all
+/// lengths so far, and one for each radian.
+inline double rounding_in(const LinkFrames& frames, size_t lane, double reach) noexcept {
+    return 0x1p-47 * (frames.steps[lane] + 1) * (frames.extent[lane] + reach);
 }
 /// The pose in one lane.
 DoublePose pose_in(const LinkFrames& frames, size_t lane) noexcept;

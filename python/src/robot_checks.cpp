@@ -222,12 +222,11 @@ RobotChecks::PairPoses RobotChecks::poses_of(const RobotPair& pair, size_t lane,
     const RobotBody& a = *robot_.links[pair.link];
     const RobotBody& b = pair.in_scene ? *bodies_[pair.other] : *robot_.links[pair.other];
     const LinkFrames& at = scratch.frames[pair.link];
-    PairPoses out{a, b, pose_in(at, lane), b.pose,
-                  a.slack + robot_.chain.rounding(pair.link, at.extent[lane], a.reach)};
+    PairPoses out{a, b, pose_in(at, lane), b.pose, a.slack + rounding_in(at, lane, a.reach)};
     if (!pair.in_scene) {
         const LinkFrames& at_b = scratch.frames[pair.other];
         out.pose_b = pose_in(at_b, lane);
-        out.rounding += b.slack + robot_.chain.rounding(pair.other, at_b.extent[lane], b.reach);
+        out.rounding += b.slack + rounding_in(at_b, lane, b.reach);
     }
     return out;
 }
