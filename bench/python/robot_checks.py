@@ -199,7 +199,7 @@ def motions(checks: robots.Checks, scene: robots.Scene, args: argparse.Namespace
     verdict = checks.motion_verdicts(q0, q1, scene, threads=1)
     each = 1e6 * (time.process_time() - start) / max(len(q0), 1)
     steps = np.linspace(0, 1, args.samples)[:, None]
-    hit = np.array([checks.collide(a + steps * (b - a), scene).any() for a, b in zip(q0, q1)])
+    hit = np.array([checks.collide(a + steps * (b - a), scene).any() for a, b in zip(q0, q1)], dtype=bool)
     free = verdict == prolate.Verdict.SEPARATED
     tunnelled = int((hit & free).sum())
     print(

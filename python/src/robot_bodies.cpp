@@ -182,7 +182,8 @@ bool may_touch(const RobotBody& a, const DoublePose& pose_a, const RobotBody& b,
     if (!cells_meet(larger, smaller, at.smaller, wide)) return false;
     const QueryOptions options{.margin = wide};
     if (b.kind == RobotBody::Kind::tree)
-        return collide(*a.view, at.a, *b.view, at.b, context, options).verdict != Verdict::separated;
+        return inner_meets_inner(larger, smaller, at.smaller) ||
+               collide(*a.view, at.a, *b.view, at.b, context, options).verdict != Verdict::separated;
     if (inner_meets_box(a.cells, b.half, at.in_b ? inverse(at.smaller) : at.smaller)) return true;
     return overlap(*a.view, at.a, Box{at.b, {b.half[0], b.half[1], b.half[2]}}, context, options).verdict !=
            Verdict::separated;

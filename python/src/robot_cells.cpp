@@ -97,6 +97,29 @@ PROLATE_ROBOT_CLONES bool search(const Cells& a, const Cells& b, const FloatPlac
     return false;
 }
 
+PROLATE_ROBOT_CLONES bool balls_meet(const std::vector<BallBlock>& a, const std::vector<BallBlock>& b,
+                                     const FloatPlace& at) {
+    const Floats zero{};
+    for (const BallBlock& others : b)
+        for (size_t i = 0; i < kLanes && others.radius[i] > 0; ++i) {
+            const float x = others.center.x[i], y = others.center.y[i], z = others.center.z[i];
+            float c[3], size = 0;
+            for (size_t k = 0; k < 3; ++k) {
+                c[k] = at.r[k][0] * x + at.r[k][1] * y + at.r[k][2] * z + at.t[k];
+                size += std::abs(at.t[k]);
+            }
+            size += std::abs(x) + std::abs(y) + std::abs(z);
+            for (const BallBlock& balls : a) {
+                const Floats3& center = balls.center;
+                const Floats3 d = {center.x - c[0], center.y - c[1], center.z - c[2]};
+                const Floats reach = absolute(center.x) + absolute(center.y) + absolute(center.z) + size;
+                const Floats near = balls.radius + others.radius[i] - reach * kSlack;
+                if (bits((balls.radius > zero) & (near > zero) & (dot(d, d) < near * near)) != 0) return true;
+            }
+        }
+    return false;
+}
+
 PROLATE_ROBOT_CLONES bool inner_meets(const BallBlock* balls, size_t count, const float (&half)[3],
                                       const FloatPlace& box) {
     const float size_of_box =
@@ -149,6 +172,10 @@ Cell Cells::cell(uint32_t node) const noexcept {
 
 bool cells_meet(const Cells& a, const Cells& b, const FloatPlace& b_in_a, const float& margin, LeafVisitor* visitor) {
     return search(a, b, b_in_a, inverse(b_in_a), margin, visitor);
+}
+
+bool inner_meets_inner(const Cells& a, const Cells& b, const FloatPlace& b_in_a) {
+    return balls_meet(a.inner, b.inner, b_in_a);
 }
 
 bool inner_meets_box(const Cells& a, const std::array<float, 3>& half, const FloatPlace& b_in_a) {

@@ -77,6 +77,8 @@ protected:
 bool cells_meet(const Cells& a, const Cells& b, const FloatPlace& b_in_a, const float& margin,
                 LeafVisitor* visitor = nullptr);
 
+/// Does a ball inside the solid of `a` certainly meet one inside that of `b`, which is at `b_in_a`?
+bool inner_meets_inner(const Cells& a, const Cells& b, const FloatPlace& b_in_a);
 /// Does a ball inside the solid of `a` certainly meet the box of these half extents at `b_in_a`?
 bool inner_meets_box(const Cells& a, const std::array<float, 3>& half, const FloatPlace& b_in_a);
 
