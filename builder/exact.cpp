@@ -35,7 +35,7 @@ namespace {
 // Of a query at a leaf, and for each of its triangles; in tests of a block of children. Pairs of triangles are tested
 // eight at a time, so that a leaf of several costs little more than one of a single triangle.
 constexpr double kLeafCost = 0.7, kTriangleCost = 0.3;
-constexpr int kRounds = 6;            // of refitting a node
+constexpr int kRefits = 6;            // of refitting a node
 constexpr double kOutside = 1 + 2e-3; // squared radial coordinate from which a point calls for a refit
 
 // What becomes of a binary node.
@@ -188,7 +188,7 @@ private:
         }
         core = without_repeats(core);
         Fit fit;
-        for (int round = 0; round < kRounds; ++round) {
+        for (int round = 0; round < kRefits; ++round) {
             fit = enclosing_ellipsoid(core, options_.min_radius);
             // In each octant of the unit ball, the point that sticks out most joins the core.
             std::array<Vec, 8> worst;

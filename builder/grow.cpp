@@ -15,7 +15,7 @@ constexpr uint32_t kMaxLeaves = 65536;
 constexpr uint32_t kDefaultLevels = 3;
 constexpr double kLeastGain = 0.999; // a level must bring the outside volume down to less than this much
 // Of the search for the least count that meets a limit:
-constexpr int kRounds = 12;             // at most
+constexpr int kSearchRounds = 12;       // at most
 constexpr uint32_t kFirstCount = 8;     // to try
 constexpr double kMet = 0.999;          // of a limit: quantisation will add a little
 constexpr double kBlocked = 8;          // an excess, of a passage that is not free at all
@@ -140,8 +140,8 @@ private:
         double low_excess = excess(root);
         if (low_excess <= kMet) return root;
         std::optional<FlatSet> best;
-        for (int round = 0; round < kRounds; ++round) {
-            FlatSet set = exactly(count, [&](double part) { report((round + part) / kRounds); });
+        for (int round = 0; round < kSearchRounds; ++round) {
+            FlatSet set = exactly(count, [&](double part) { report((round + part) / kSearchRounds); });
             if (best) follow_cuts(*best, solid_.pieces);
             const double now = excess(set);
             const bool met = now <= kMet;

@@ -16,8 +16,8 @@
 namespace prolate {
 namespace {
 
-constexpr size_t kMostCells = 20'000; // of one ellipsoid's branch and bound
-constexpr double kSame = 1e-12;       // squared radial coordinates this close to 1 are on the surface
+constexpr size_t kMostBranches = 20'000; // of one ellipsoid's branch and bound
+constexpr double kSame = 1e-12;          // squared radial coordinates this close to 1 are on the surface
 
 // Which ellipsoids' boxes meet a box: a binary tree over the boxes.
 class BoxTree {
@@ -270,7 +270,7 @@ private:
         const Vec lengths(axes_[i].radii);
         while (!cells.empty() && cells.top().upper > lower + tolerance) {
             checkpoint();
-            if (number > kMostCells) return {lower, cells.top().upper};
+            if (number > kMostBranches) return {lower, cells.top().upper};
             const Cell cell = cells.top();
             cells.pop();
             int axis = 0;

@@ -131,7 +131,7 @@ ObjectMesh read_mesh(Cursor chunk, const std::string& name) {
     return mesh;
 }
 
-struct Node {
+struct Node3ds {
     std::string name;
     uint16_t id = 0, parent = kNoParent;
     Point pivot = {};
@@ -174,8 +174,8 @@ Affine rotation(const std::array<double, 4>& angle_axis) {
     return out;
 }
 
-Node read_node(Cursor chunk, size_t number) {
-    Node node;
+Node3ds read_node(Cursor chunk, size_t number) {
+    Node3ds node;
     node.id = static_cast<uint16_t>(number);
     Point position = {}, scale = {1, 1, 1};
     std::array<double, 4> turn = {};
@@ -237,7 +237,7 @@ public:
             const auto [first, last] = by_name_.equal_range(mesh.name);
             if (first == last) add(out, mesh, {});
             for (auto named = first; named != last; ++named) {
-                const Node& node = nodes_.at(named->second);
+                const Node3ds& node = nodes_.at(named->second);
                 Affine pivot;
                 for (size_t i = 0; i < 3; ++i) pivot.m[i][3] = -node.pivot[i];
                 add(out, mesh, to_scene(node) * pivot * to_own_frame(mesh));
@@ -261,17 +261,17 @@ private:
             if (id < kFirstNode || id > kLastNode) return;
             const size_t number = node_count_++;
             if (id != kObjectNode) return;
-            const Node node = read_node(in, number);
+            const Node3ds node = read_node(in, number);
             if (!nodes_.emplace(node.id, node).second)
                 throw Error{ErrorCode::bad_file, "two nodes of the same number", in.at()};
             by_name_.emplace(node.name, node.id);
         });
     }
 
-    Affine to_scene(const Node& node) const {
+    Affine to_scene(const Node3ds& node) const {
         Affine out = node.to_parent;
         uint16_t parent = node.parent;
-        for (size_t steps = 0; parent != Node::kNoParent; ++steps) {
+        for (size_t steps = 0; parent != Node3ds::kNoParent; ++steps) {
             checkpoint();
             const auto found = nodes_.find(parent);
             if (found == nodes_.end())
@@ -300,7 +300,7 @@ private:
     }
 
     std::vector<ObjectMesh> meshes_;
-    std::map<uint16_t, Node> nodes_; // those of objects, by id
+    std::map<uint16_t, Node3ds> nodes_; // those of objects, by id
     std::multimap<std::string, uint16_t> by_name_;
     size_t node_count_ = 0; // of any kind
 };

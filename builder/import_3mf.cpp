@@ -49,7 +49,7 @@ Affine affine(const MODELTRANSFORM& t) {
     return out;
 }
 
-struct Part {
+struct ComponentPart {
     Handle object;
     Affine transform;
     unsigned depth = 0;
@@ -109,13 +109,13 @@ public:
     explicit ItemReader(Polygons& out) : out_(out) {}
 
     void read(PLib3MFBase* item) {
-        Part whole;
+        ComponentPart whole;
         whole.transform = placed(item, lib3mf_builditem_hasobjecttransform, lib3mf_builditem_getobjecttransform);
         need(lib3mf_builditem_getobjectresource(item, whole.object.out()));
         todo_.push_back(std::move(whole));
         while (!todo_.empty()) {
             checkpoint();
-            const Part part = std::move(todo_.back());
+            const ComponentPart part = std::move(todo_.back());
             todo_.pop_back();
             if (part.depth > kMostDepth) throw Error{ErrorCode::bad_file, "components nested too deeply"};
             if (++parts_ > kMostParts) throw Error{ErrorCode::bad_file, "more than 10 million components"};
@@ -128,13 +128,13 @@ public:
     }
 
 private:
-    void push_components(const Part& group) {
+    void push_components(const ComponentPart& group) {
         DWORD count = 0;
         need(lib3mf_componentsobject_getcomponentcount(group.object.get(), &count));
         for (DWORD i = count; i-- > 0;) {
             Handle component;
             need(lib3mf_componentsobject_getcomponent(group.object.get(), i, component.out()));
-            Part child;
+            ComponentPart child;
             child.transform =
                 group.transform * placed(component.get(), lib3mf_component_hastransform, lib3mf_component_gettransform);
             child.depth = group.depth + 1;
@@ -144,7 +144,7 @@ private:
     }
 
     Polygons& out_;
-    std::vector<Part> todo_;
+    std::vector<ComponentPart> todo_;
     size_t parts_ = 0;
 };
 

@@ -15,9 +15,9 @@
 namespace prolate {
 namespace {
 
-constexpr double kStepsOfRadius = 6;   // in the ball's radius, ...
-constexpr double kMostSteps = 96;      // ... but not more than these in the box's longest side
-constexpr double kRegionMargin = 0.15; // of that side: how far around the mesh the lattice reaches, besides the ball
+constexpr double kStepsOfRadius = 6;    // in the ball's radius, ...
+constexpr double kMostStepsAcross = 96; // ... but not more than these in the box's longest side
+constexpr double kRegionMargin = 0.15;  // of that side: how far around the mesh the lattice reaches, besides the ball
 constexpr double kCoordinateRounding = 1e-12; // of the largest coordinate
 constexpr int kIterations = 60;               // of a bisection
 
@@ -168,7 +168,7 @@ Passages::Passages(MeshView mesh, double radius) {
     Box box;
     for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
     const double side = box.size().maxCoeff();
-    const double pitch = std::max(radius / kStepsOfRadius, side / kMostSteps);
+    const double pitch = std::max(radius / kStepsOfRadius, side / kMostStepsAcross);
     needed_ = radius + 0.5 * std::sqrt(3.0) * pitch;
     const Vec margin = Vec::Constant(needed_ + kRegionMargin * side);
     const Box region{box.low - margin, box.high + margin};

@@ -13,13 +13,13 @@
 namespace prolate {
 namespace {
 
-constexpr double kHeld = 1 + 1e-7;       // squared radial coordinate up to which a point counts as held
-constexpr double kNearlyHeld = 1.005;    // scale of an ellipsoid that holds a piece well enough not to cut it
-constexpr double kNeighbourMargin = 1.2; // ellipsoids may grow so much before neighbours are looked for again
-constexpr int kNeighbourInterval = 4;    // sweeps
-constexpr double kStepDecay = 0.8;       // of the step's square root, over all sweeps
-constexpr double kFirstReward = 0.1;     // for volume inside the solid that no other covers; falls to 0
-constexpr double kAlmostCapped = 0.9;    // of the largest axis ratio of steps
+constexpr double kHeld = 1 + 1e-7;    // squared radial coordinate up to which a point counts as held
+constexpr double kNearlyHeld = 1.005; // scale of an ellipsoid that holds a piece well enough not to cut it
+constexpr double kPolishMargin = 1.2; // ellipsoids may grow so much before neighbours are looked for again
+constexpr int kPolishInterval = 4;    // sweeps
+constexpr double kPolishDecay = 0.8;  // of the step's square root, over all sweeps
+constexpr double kFirstReward = 0.1;  // for volume inside the solid that no other covers; falls to 0
+constexpr double kAlmostCapped = 0.9; // of the largest axis ratio of steps
 constexpr int kCuttingRounds = 8;
 constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
@@ -98,8 +98,8 @@ public:
         adopt_orphans();
         const int sweeps = std::max(1, options_.sweeps);
         for (int sweep = 0; sweep < sweeps; ++sweep) {
-            if (sweep > 0 && sweep % kNeighbourInterval == 0) find_candidates();
-            const double t = static_cast<double>(sweep) / std::max(1, sweeps - 1), left = 1 - kStepDecay * t;
+            if (sweep > 0 && sweep % kPolishInterval == 0) find_candidates();
+            const double t = static_cast<double>(sweep) / std::max(1, sweeps - 1), left = 1 - kPolishDecay * t;
             step_ = options_.first_step * left * left;
             reward_ = kFirstReward * std::max(0.0, 1 - 2 * t);
             const Mat rotation = random_rotation(random_);
@@ -145,9 +145,9 @@ private:
     // For each ellipsoid, the pieces that it holds or may come to hold; and groups of ellipsoids far apart, that can
     // be moved at the same time.
     void find_candidates() {
-        neighbours_ = neighbours_of(fits_, kNeighbourMargin);
+        neighbours_ = neighbours_of(fits_, kPolishMargin);
         parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
-            const Box box = box_of(fits_[i], kNeighbourMargin);
+            const Box box = box_of(fits_[i], kPolishMargin);
             candidates_[i].clear();
             pieces_.for_each_near(box, [&](uint32_t piece) {
                 const Vec& c = pieces_.center(piece);
@@ -189,13 +189,13 @@ private:
     // A piece that nobody holds goes to the ellipsoid whose growth costs the least volume.
     void adopt_orphans() {
         std::vector<double> least(pieces_.size(), HUGE_VAL);
-        const double far = kNeighbourMargin * kNeighbourMargin * kNeighbourMargin - 1;
+        const double far = kPolishMargin * kPolishMargin * kPolishMargin - 1;
         const auto offer = [&](uint32_t i, uint32_t piece) {
             const double growth = growth_of(fits_[i], piece);
             if (growth < least[piece]) least[piece] = growth, needed_by_[piece] = i;
         };
         for (uint32_t i = 0; i < fits_.size(); ++i)
-            pieces_.for_each_near(box_of(fits_[i], kNeighbourMargin), [&](uint32_t piece) {
+            pieces_.for_each_near(box_of(fits_[i], kPolishMargin), [&](uint32_t piece) {
                 if (holders_[piece] == 0) offer(i, piece);
             });
         for (uint32_t piece = 0; piece < pieces_.size(); ++piece) {

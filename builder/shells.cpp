@@ -31,7 +31,7 @@ constexpr double kClearlyNegative = -0.25; // of -1/2, and its error
 constexpr double kNoVolume = 1e-9;         // of the area's 3/2 power: flat, or as much in as out
 constexpr double kOffSurface = 1e-3; // of the root of a triangle's area: a step to where the winding number is clear
 
-struct Side {
+struct ShellSide {
     uint32_t low, high, triangle;
     int32_t sign;
 };
@@ -43,14 +43,14 @@ struct Shells {
 };
 
 Shells find_shells(std::span<const Triangle> triangles) {
-    std::vector<Side> sides;
+    std::vector<ShellSide> sides;
     sides.reserve(3 * triangles.size());
     for (uint32_t t = 0; t < triangles.size(); ++t)
         for (size_t i = 0; i < 3; ++i) {
             const uint32_t from = triangles[t][i], to = triangles[t][(i + 1) % 3];
             if (from != to) sides.push_back({std::min(from, to), std::max(from, to), t, from < to ? 1 : -1});
         }
-    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    std::sort(sides.begin(), sides.end(), [](const ShellSide& a, const ShellSide& b) {
         return a.low != b.low ? a.low < b.low : a.high != b.high ? a.high < b.high : a.triangle < b.triangle;
     });
     std::vector<uint32_t> parent(triangles.size());
@@ -81,7 +81,7 @@ Shells find_shells(std::span<const Triangle> triangles) {
 }
 
 // How much a shell encloses.
-struct Extent {
+struct ShellExtent {
     double volume = 0, area = 0;
 
     bool has_volume() const { return std::abs(volume) > kNoVolume * std::pow(area, 1.5); }
@@ -93,10 +93,10 @@ std::array<Vec, 3> corners_of(const Mesh& mesh, uint32_t t) {
 }
 
 // Volumes are taken around a point of each shell, so that they keep their digits far from (0, 0, 0).
-std::vector<Extent> extents(const Mesh& mesh, const Shells& shells) {
+std::vector<ShellExtent> extents(const Mesh& mesh, const Shells& shells) {
     constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
     std::vector<uint32_t> first(shells.closed.size(), kNone);
-    std::vector<Extent> out(shells.closed.size());
+    std::vector<ShellExtent> out(shells.closed.size());
     for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
         const uint32_t shell = shells.of[t];
         if (first[shell] == kNone) first[shell] = t;
@@ -112,7 +112,7 @@ std::vector<Extent> extents(const Mesh& mesh, const Shells& shells) {
 
 TurnedShells turn_shells(Mesh& mesh) {
     const Shells shells = find_shells(mesh.triangles);
-    const std::vector<Extent> extent = extents(mesh, shells);
+    const std::vector<ShellExtent> extent = extents(mesh, shells);
     const size_t count = extent.size();
     TurnedShells out;
     bool any_inward = false;

@@ -15,12 +15,12 @@ using namespace prolate::capi;
 namespace {
 
 // What every query of a world takes, checked.
-template <class Given> struct Call {
+template <class Given> struct WorldCall {
     Given given = fresh<Given>();
     Workers workers;
     prolate_status status = PROLATE_OK;
 
-    Call(const prolate_world* world, const prolate_workers* by, const Given* options) {
+    WorldCall(const prolate_world* world, const prolate_workers* by, const Given* options) {
         const Jobs jobs = by != nullptr ? jobs_of(by->jobs) : Jobs{};
         QueryContext* const contexts =
             by != nullptr ? contexts_of(by->scratch, by->scratch_size, jobs.workers) : nullptr;
@@ -70,7 +70,7 @@ static_assert(sizeof(prolate_ray) == sizeof(Ray));
 prolate_status prolate_world_collide(const prolate_world* world, const prolate_body_pair* pairs, size_t count,
                                      const prolate_workers* workers, const prolate_query_options* options,
                                      prolate_verdict* verdicts) {
-    const Call call(world, workers, options);
+    const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     if (!sound(pairs, count, verdicts)) return PROLATE_BAD_ARGUMENT;
     static_assert(sizeof(Verdict) == sizeof(prolate_verdict));
@@ -82,7 +82,7 @@ prolate_status prolate_world_collide(const prolate_world* world, const prolate_b
 prolate_status prolate_world_distance(const prolate_world* world, const prolate_body_pair* pairs, size_t count,
                                       const prolate_workers* workers, const prolate_distance_options* options,
                                       prolate_distance_answer* answers) {
-    const Call call(world, workers, options);
+    const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     if (!sound(pairs, count, answers)) return PROLATE_BAD_ARGUMENT;
     for (size_t i = 0; i < count; ++i)
@@ -107,7 +107,7 @@ prolate_status prolate_world_distance(const prolate_world* world, const prolate_
 prolate_status prolate_world_contacts(const prolate_world* world, const prolate_body_pair* pairs, size_t count,
                                       const prolate_workers* workers, const prolate_query_options* options,
                                       prolate_pair_contacts* records, size_t record_count) {
-    const Call call(world, workers, options);
+    const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     if (!sound(pairs, count, records) || (records == nullptr && record_count > 0)) return PROLATE_BAD_ARGUMENT;
     return status_of(contacts(*world->world, pairs_of(pairs, count),
@@ -130,7 +130,7 @@ prolate_status prolate_world_contact_events(const prolate_world* world, prolate_
 prolate_status prolate_world_raycast(const prolate_world* world, const prolate_ray* rays, size_t count, uint32_t mask,
                                      const prolate_workers* workers, const prolate_query_options* options,
                                      prolate_ray_hit* hits) {
-    const Call call(world, workers, options);
+    const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     if (!sound(rays, count, hits)) return PROLATE_BAD_ARGUMENT;
     return by_parts<RayHit>(
@@ -149,7 +149,7 @@ prolate_status prolate_world_raycast(const prolate_world* world, const prolate_r
 prolate_status prolate_world_overlap(const prolate_world* world, const prolate_shape* shape, uint32_t mask,
                                      const prolate_workers* workers, const prolate_query_options* options,
                                      prolate_body_id* ids, size_t capacity, size_t* found) {
-    const Call call(world, workers, options);
+    const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     if (shape == nullptr || found == nullptr || (ids == nullptr && capacity > 0)) return PROLATE_BAD_ARGUMENT;
     Probe probe;
@@ -176,7 +176,7 @@ prolate_status prolate_world_overlap(const prolate_world* world, const prolate_s
 prolate_status prolate_world_sweep(const prolate_world* world, const prolate_tree* tree, prolate_motion motion,
                                    uint32_t mask, const prolate_workers* workers, const prolate_sweep_options* options,
                                    prolate_body_id* body, prolate_sweep_result* result) {
-    const Call call(world, workers, options);
+    const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     const TreeView* const view = view_of(tree);
     if (view == nullptr || body == nullptr || result == nullptr) return PROLATE_BAD_ARGUMENT;
