@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from robot_parts import arm, baked, frames, l_shape, points_of_l, pose
 
-from prolate.robots._model import EllipsoidShape, Geometry, MeshShape, Mimic
+from prolate.robots._model import EllipsoidShape, Geometry, Inertial, MeshShape, Mimic
 from prolate.robots._robot import Robot
 from prolate.robots._solids import hull_of, moved, polyhedron
 from prolate.robots._write_mjcf import write_mjcf
@@ -157,3 +157,17 @@ def test_nothing_is_written_where_nothing_can_be(tmp_path: Path) -> None:
     with pytest.raises(Exception, match="a_file"):
         write_mjcf(robot, tmp_path / "a_file" / "arm.xml")
     assert [one.name for one in tmp_path.iterdir()] == ["a_file"]
+
+
+@pytest.mark.parametrize("moments", [(1, 1, 3), (-1, 2, 2), (0, 0, 0), (1, 2, 3)])
+def test_inertia_that_no_body_has_is_mended(tmp_path: Path, moments: tuple[float, float, float]) -> None:
+    description = arm()
+    turn = pose(8)[:3, :3]
+    inertial = Inertial(2.0, turn @ np.diag(np.array(moments) * 1e-3) @ turn.T, pose(9))
+    links = tuple(replace(link, inertial=inertial) for link in description.links)
+    robot = Robot(replace(description, links=links)).bake(only="hull")
+    model = compiled(robot, tmp_path / "arm.xml")
+    found = np.sort(model.body_inertia[-1])
+    assert found[0] > 0 and found[2] <= found[0] + found[1] and model.body_mass[-1] == 2
+    if moments == (1, 2, 3):
+        np.testing.assert_allclose(found, np.array(moments) * 1e-3, rtol=1e-5)

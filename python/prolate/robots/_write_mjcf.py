@@ -112,18 +112,15 @@ class _Mjcf:
         return [link for link in self.description.links if link.name not in moved] + children
 
     def _bounds(self) -> dict[str, str]:
-        """MuJoCo refuses links that move and have no mass, and inertias that no body has."""
-        bounds = {}
-        if not all(_is_whole(link.inertial) for link in self.description.links):
-            bounds = {"boundmass": "1e-6", "boundinertia": "1e-9"}
-        if not all(_is_possible(link.inertial) for link in self.description.links if link.inertial is not None):
-            bounds["balanceinertia"] = "true"
-        return bounds
+        """MuJoCo refuses links that move and have no mass."""
+        if all(_is_whole(link.inertial) for link in self.description.links):
+            return {}
+        return {"boundmass": "1e-6", "boundinertia": "1e-9"}
 
     def _fill(self, body: Element, link: Link) -> None:
         if link.inertial is not None and link.inertial.mass > 0:
             turn = link.inertial.pose[:3, :3]
-            i = turn @ link.inertial.inertia @ turn.T  # along the link's axes: MuJoCo takes no others
+            i = turn @ _possible(link.inertial.inertia) @ turn.T  # along the link's axes: MuJoCo takes no others
             SubElement(
                 body, "inertial", mass=text(link.inertial.mass), pos=text(*link.inertial.pose[:3, 3]),
                 fullinertia=text(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]),
@@ -195,10 +192,16 @@ def _is_whole(inertial: Inertial | None) -> bool:
     return inertial is not None and inertial.mass > 0 and bool((np.linalg.eigvalsh(inertial.inertia) > 0).all())
 
 
-def _is_possible(inertial: Inertial) -> bool:
-    """Is no principal moment above the sum of the other two?"""
-    moments = np.linalg.eigvalsh(inertial.inertia)
-    return bool(moments[2] <= moments[0] + moments[1])
+def _possible(inertia: Matrix) -> Matrix:
+    """The tensor, or one near it that a body can have: MuJoCo refuses all others. What is read warns of them."""
+    moments, axes = np.linalg.eigh(inertia)
+    if moments[0] > 0 and moments[2] <= moments[0] + moments[1]:
+        return inertia
+    moments = np.maximum(moments, max(1e-6 * moments[2], 1e-9))
+    lacking = moments[2] - moments[0] - moments[1]
+    if lacking > -1e-6 * moments[2]:
+        moments[:2] += (lacking + 1e-6 * moments[2]) / 2
+    return np.asarray(axes @ np.diag(moments) @ axes.T)
 
 
 def _frame(pose: Matrix) -> dict[str, str]:
