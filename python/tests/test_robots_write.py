@@ -18,6 +18,7 @@ from prolate.robots._model import BoxShape, EllipsoidShape, Mimic, SphereShape
 from prolate.robots._proof import holds_ellipsoids, holds_points
 from prolate.robots._solids import moved
 from prolate.robots._writing import quaternion, roll_pitch_yaw
+from prolate.robots._xml import rpy_matrix
 
 KINDS = [None, "ellipsoids", "spheres", "hull", "capsule", "cylinder"]
 
@@ -115,6 +116,7 @@ def test_rotations_as_text_mean_the_same_matrix() -> None:
         np.diag([1.0, -1, -1]),
         np.diag([-1.0, 1, -1]),
         np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]]),
+        *(rpy_matrix((0.3, np.pi / 2 - off, 0.4)) for off in (1e-15, 1e-12, 1e-9, 1e-6)),
     ]
     for matrix in turned:
         w, x, y, z = quaternion(matrix)

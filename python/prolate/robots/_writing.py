@@ -36,12 +36,12 @@ def quaternion(rotation: Matrix) -> tuple[float, float, float, float]:
 
 def roll_pitch_yaw(rotation: Matrix) -> tuple[float, float, float]:
     """Angles about the fixed axes x, y and z, in this order; radians."""
-    across = float(np.hypot(rotation[0, 0], rotation[1, 0]))
-    pitch = float(np.arctan2(-rotation[2, 0], across))
-    if across < 1e-9:  # looking along z: only the sum or the difference of the other two matters
-        return float(np.arctan2(-rotation[1, 2], rotation[1, 1])), pitch, 0.0
     roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
-    return roll, pitch, float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    pitch = float(np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0])))
+    # What the roll leaves to turn. When the pitch is near 90 degrees the roll is ill determined; this makes up for it.
+    s, c = np.sin(roll), np.cos(roll)
+    yaw = np.arctan2(s * rotation[0, 2] - c * rotation[0, 1], c * rotation[1, 1] - s * rotation[1, 2])
+    return roll, pitch, float(yaw)
 
 
 @dataclass
