@@ -1,4 +1,4 @@
-"""What is written, read by the targets themselves: Pinocchio and Coal, Newton, PyBullet; ./run robots calls this.
+"""What is written, read by the targets themselves: Pinocchio with Coal, Newton, PyBullet, Drake; for ./run robots.
 
 A small robot at general rotations is written, loaded, and asked: random points of its solids, in the world, must be in
 the shapes as the target has and places them. MuJoCo's part is in python/tests/test_robots_write_mjcf.py.
@@ -15,7 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python" / "tests"))
 from robot_parts import arm, baked, frames, points_of_l, pose, wedge
 
-from prolate.robots import BakedRobot, add_to_newton, geometry_model, write_urdf
+from prolate.robots import BakedRobot, add_to_newton, geometry_model, write_sdf, write_urdf
 from prolate.robots._model import (
     BoxShape,
     CapsuleShape,
@@ -148,17 +148,45 @@ def ask_pybullet(robot: BakedRobot, folder: Path, label: str) -> None:
     pb.disconnect()
 
 
+def ask_drake(robot: BakedRobot, folder: Path, label: str) -> None:
+    """By the distances of points from geometries, which Drake calculates to a few micrometres for ellipsoids."""
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+    from pydrake.systems.framework import DiagramBuilder
+
+    write_urdf(robot, folder / "arm.urdf", ellipsoids="drake", visuals=False)
+    write_sdf(robot, folder / "arm.sdf", visuals=False)
+    for path in (folder / "arm.urdf", folder / "arm.sdf"):
+        builder = DiagramBuilder()
+        plant, scene = AddMultibodyPlantSceneGraph(builder, 0.0)
+        Parser(plant).AddModels(str(path))
+        if path.suffix == ".urdf":
+            plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
+        plant.Finalize()
+        diagram = builder.Build()
+        context = diagram.CreateDefaultContext()
+        plant.SetPositions(plant.GetMyContextFromRoot(context), [Q["turn"], Q["push"]])
+        query = scene.get_query_output_port().Eval(scene.GetMyContextFromRoot(context))
+        for link, points in SOLIDS.items():
+            solid = plant.GetCollisionGeometriesForBody(plant.GetBodyByName(link))
+            for point in moved(frames(arm(), Q)[link], points[-100:]):
+                apart = [one.distance for one in query.ComputeSignedDistanceToPoint(point) if one.id_G in solid]
+                if min(apart) > 3e-6:
+                    sys.exit(f"{label}, {path.suffix}: a point of {link} is {min(apart):.1e} m outside of its cover")
+
+
 def main() -> None:
     with tempfile.TemporaryDirectory() as cache:
-        for target in (pinocchio, newton, ask_pybullet):
+        for target in (pinocchio, newton, ask_pybullet, ask_drake):
             for only in KINDS:
-                robot, label = baked(only, Path(cache)), f"{target.__name__}, {only}"
+                robot, label = baked(only, Path(cache)), f"{target.__name__.removeprefix('ask_')}, {only}"
                 with tempfile.TemporaryDirectory() as folder:  # PyBullet remembers files by their names
-                    if target is ask_pybullet:
-                        ask_pybullet(robot, Path(folder), label)
+                    if target in (ask_pybullet, ask_drake):
+                        target(robot, Path(folder), label)
                     else:
                         check(label, target(robot, Path(folder)))
-            print(f"{target.__name__}: the covers of all kinds hold the links, where the target places them")
+            name = target.__name__.removeprefix("ask_")
+            print(f"{name}: covers of all kinds hold the links, where it places them")
 
 
 if __name__ == "__main__":

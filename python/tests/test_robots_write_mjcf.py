@@ -142,13 +142,17 @@ def test_the_arena_holds_what_many_ellipsoids_touch(tmp_path: Path) -> None:
     assert data.ncon > 500 and data.warning[mujoco.mjtWarning.mjWARN_CONTACTFULL].number == 0
 
 
-def test_flat_visuals_and_links_without_mass_are_accepted(tmp_path: Path) -> None:
+def test_flat_visuals_and_links_without_mass_or_inertia_are_accepted(tmp_path: Path) -> None:
     description = arm()
     flat = MeshShape(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.0]]), np.array([[0, 1, 2]]))
-    links = tuple(replace(link, visuals=(Geometry(flat, pose(8)),), inertial=None) for link in description.links)
+    bare = (None, Inertial(1.0, np.zeros((3, 3))), Inertial(1.0, np.diag([1.0, 1.0, 9.0])))
+    links = tuple(
+        replace(link, visuals=(Geometry(flat, pose(8)),), inertial=inertial)
+        for link, inertial in zip(description.links, bare)
+    )
     robot = Robot(replace(description, links=links)).bake(only="hull")
     model = compiled(robot, tmp_path / "arm.xml")
-    assert (model.body_mass[2:] > 0).all()
+    assert (model.body_mass[2:] > 0).all() and (model.body_inertia[2:] > 0).all()
 
 
 def test_nothing_is_written_where_nothing_can_be(tmp_path: Path) -> None:
