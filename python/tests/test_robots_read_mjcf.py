@@ -170,3 +170,12 @@ def test_what_mujoco_refuses_is_refused_in_its_words(write):
     with pytest.raises(prolate.Error, match=r"robot\.xml: MuJoCo: .*none") as error:
         robots.load(write(ROBOT.replace('class="small" fromto', 'class="none" fromto')))
     assert error.value.code == "bad_file"
+
+
+@pytest.mark.filterwarnings("ignore:XML contains a 'NaN'")
+@pytest.mark.parametrize(("old", "new"), [('axis="0 1 1"', 'axis="0 nan 1"'), ('pos="0 1 0"', 'pos="0 nan 0"')])
+def test_numbers_that_are_not_finite_are_refused(write, old, new):
+    assert old in ROBOT
+    with pytest.raises(prolate.Error, match=r"robot\.xml: MuJoCo") as error:
+        robots.load(write(ROBOT.replace(old, new)))
+    assert error.value.code == "bad_file"

@@ -38,6 +38,10 @@ if TYPE_CHECKING:
     Spec = Any  # mujoco.MjSpec
     Model = Any  # mujoco.MjModel
 
+_NUMBERS = (
+    "body_pos", "body_quat", "body_mass", "body_ipos", "body_iquat", "body_inertia", "jnt_pos", "jnt_axis", "jnt_range",
+    "qpos0", "geom_pos", "geom_quat", "geom_size", "mesh_vert", "mesh_pos", "mesh_quat", "eq_data",
+)  # fmt: skip
 _SHOWN = 3  # MuJoCo shows geoms of the groups below this one
 _NO_MASS = 1e-12  # what a body without any gets here, so that MuJoCo compiles the others; its own least is 1e-15
 
@@ -51,6 +55,9 @@ def read_mjcf(path: Path, meshes: Meshes, notes: Notes, visuals: bool) -> Parts:
         reader.model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise Error(f"{path}: MuJoCo: {' '.join(str(error).split())}", "bad_file") from None
+    for name in _NUMBERS:  # MuJoCo takes "nan" for a number
+        if not np.isfinite(getattr(reader.model, name)).all():
+            raise Error(f"{path}: MuJoCo reads a number that is not finite, in {name}; correct the file", "bad_file")
     return reader.robot()
 
 
