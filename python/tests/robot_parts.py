@@ -74,7 +74,7 @@ def arm() -> Description:
 
 def baked(only: str | None, cache: Path) -> BakedRobot:
     """arm() with covers of all kinds or of one, which are so loose that they take little time."""
-    return Robot(arm()).bake(clearance=0.1 if only is None else 0.2, only=only, cache=cache)
+    return Robot(arm()).bake(clearance=0.1 if only is None else 0.2, only=only, max_ellipsoids=8, cache=cache)
 
 
 def frames(description: Description, q: dict[str, float]) -> dict[str, np.ndarray]:

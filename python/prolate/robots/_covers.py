@@ -94,6 +94,7 @@ class Solid:
     def __init__(self, link: Link, geometries: Sequence[Geometry], options: Options) -> None:
         self.link, self.geometries, self.options = link, geometries, options
         self.vertices, self.faces = merged(geometries)
+        self._leaves: dict[str, Cover] = {}
         self.rounding = float(np.linalg.norm(self.vertices - self.vertices.astype(np.float32), axis=1).max(initial=0.0))
         self.growth = self.rounding + 4e-7 * float(np.abs(self.vertices).max(initial=0.0))
 
@@ -167,7 +168,13 @@ class Solid:
         return "ellipsoids" if "ellipsoids" in kinds else "spheres" if "spheres" in kinds else None
 
     def leaves(self, **goal: Any) -> Cover:
-        """By a bake with this goal. Raises what it does."""
+        """By a bake with this goal, which is done once. Raises what it does."""
+        known = repr(sorted(goal.items()))
+        if known not in self._leaves:
+            self._leaves[known] = self._baked_leaves(goal)
+        return self._leaves[known]
+
+    def _baked_leaves(self, goal: dict[str, Any]) -> Cover:
         kind = self.baked_kind or "ellipsoids"
         primitive = "ellipsoid" if kind == "ellipsoids" else "sphere"
         tree = self.baked(primitive=primitive, quality=self.options.quality, **goal)
