@@ -92,7 +92,7 @@ class Meshes:
     packages: Packages
     dae_unit: Literal["obey", "ignore"] | None = None
     gltf_axes: Literal["keep", "turn"] | None = None
-    _read: dict[tuple[Path, tuple[float, float, float]], tuple[MeshShape, list[str]]] = field(default_factory=dict)
+    _read: dict[tuple[str, tuple[float, float, float]], tuple[MeshShape, list[str]]] = field(default_factory=dict)
 
     def shape(self, name: str, scale: tuple[float, float, float]) -> tuple[MeshShape, list[str]]:
         """The mesh, and what should be said about it. Raises MeshError."""
@@ -100,10 +100,9 @@ class Meshes:
             raise MeshError(
                 f"{name}: a scale of {scale[0]:g} {scale[1]:g} {scale[2]:g} leaves no volume; none may be 0"
             )
-        path = self.packages.find(name)
-        if (path, scale) not in self._read:
-            self._read[path, scale] = self._shape(path, scale)
-        return self._read[path, scale]
+        if (name, scale) not in self._read:
+            self._read[name, scale] = self._shape(self.packages.find(name), scale)
+        return self._read[name, scale]
 
     def _shape(self, path: Path, scale: tuple[float, float, float]) -> tuple[MeshShape, list[str]]:
         kind = path.suffix.lower()
