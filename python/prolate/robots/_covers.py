@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial import QhullError
 
 from .. import Asset, Ellipsoids, Tree, least_clearance
 from .._bake_many import bake_asset
@@ -103,7 +102,7 @@ class Solid:
         """The corners of the convex hull; none of flat meshes."""
         try:
             return hull_triangles(self.vertices)[0]
-        except (QhullError, ValueError):
+        except ValueError:
             return np.empty((0, 3))
 
     @cached_property

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from ._model import BoxShape, CapsuleShape, CylinderShape, Geometry, Matrix, MeshShape, SphereShape
 from ._solids import grown, hull_of, hull_triangles, inverse, moved, outside
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 
 def around(points: Matrix, kind: str) -> Geometry:
@@ -62,6 +64,8 @@ def _outer_hull(hull: ConvexHull, most: int) -> tuple[Matrix, NDArray[np.int64]]
 
 def _corners(planes: Matrix, inner: Matrix) -> Matrix:
     """Of what lies below all planes, each once."""
+    from scipy.spatial import HalfspaceIntersection
+
     points = HalfspaceIntersection(planes, inner).intersections
     near = np.unique((points / np.ptp(points)).round(9), axis=0, return_index=True)[1]
     corners: Matrix = points[near]

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from ._model import (
     BoxShape,
@@ -25,6 +25,9 @@ from ._model import (
     Shape,
     SphereShape,
 )
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 Faces = NDArray[np.int64]
 Triangles = tuple[Matrix, Faces]
@@ -127,13 +130,18 @@ def merged(geometries: Iterable[Geometry]) -> Triangles:
 
 
 def hull_of(points: Matrix) -> ConvexHull:
-    """The convex hull; raises ``QhullError`` where the points are flat."""
+    """The convex hull; raises ValueError where the points are flat."""
     return _hull(points.tobytes())
 
 
 @lru_cache(maxsize=64)
 def _hull(points: bytes) -> ConvexHull:
-    return ConvexHull(np.frombuffer(points).reshape(-1, 3))
+    from scipy.spatial import ConvexHull, QhullError  # late: what is in the cache needs none, and it takes 0.3 s
+
+    try:
+        return ConvexHull(np.frombuffer(points).reshape(-1, 3))
+    except QhullError:
+        raise ValueError("the points are flat: they have no hull with a volume") from None
 
 
 def hull_triangles(points: Matrix) -> Triangles:
@@ -152,7 +160,7 @@ def is_flat(points: Matrix) -> bool:
     """Have the points no hull with a volume?"""
     try:
         hull_of(points)
-    except (QhullError, ValueError):
+    except ValueError:
         return True
     return False
 
