@@ -14,8 +14,6 @@ static_assert(sizeof(Pose) == 7 * sizeof(float) && sizeof(DoublePose) == 7 * siz
 
 constexpr double kMost = std::numeric_limits<float>::max();
 
-using Quaternion = std::array<double, 4>;
-
 // All quaternions here have squares within range: check() lets nothing else through.
 double square_of(const Quaternion& q) noexcept {
     return q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -37,11 +35,6 @@ Point turned(const Quaternion& q, const Point& v) noexcept {
 }
 Quaternion conjugate(const Quaternion& q) noexcept {
     return {-q[0], -q[1], -q[2], q[3]};
-}
-Quaternion product(const Quaternion& a, const Quaternion& b) noexcept {
-    return {
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
 }
 
 std::string at_index(const char* name, bool single, size_t i) {

@@ -24,6 +24,14 @@ struct DoublePose {
     double q[4] = {0, 0, 0, 1};
 };
 using Point = std::array<double, 3>;
+using Quaternion = std::array<double, 4>; ///< x y z w
+
+/// Turns by `b`, then by `a`.
+inline Quaternion product(const Quaternion& a, const Quaternion& b) noexcept {
+    return {
+        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
+        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
+}
 
 /// Are all its numbers floats?
 bool holds_floats(const DoublePose& pose) noexcept;

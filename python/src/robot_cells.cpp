@@ -4,7 +4,7 @@
 // Hierarchical Structure for Rapid Interference Detection", SIGGRAPH 1996, less the nine axes across edges). All of
 // this is in single precision. Entries of a FloatPlace are off by 8 u, u = 2^-24, sums of three products by 4 u more,
 // so a gap along a unit vector is wrong by less than 32 u times the sum of the lengths involved; 2^-18 of it is
-// demanded.
+// demanded (kBoxSlack).
 #include "python/src/robot_cells.hpp"
 
 #include <algorithm>
@@ -12,8 +12,6 @@
 
 namespace prolate::python {
 namespace {
-
-constexpr float kSlack = 0x1p-18f;
 
 // A box in the frame of other cells: each column of `edge` is an axis times the half extent.
 struct PlacedCell {
@@ -28,7 +26,7 @@ PROLATE_ROBOT_INLINE PlacedCell placed(const Cell& cell, const FloatPlace& at, f
             at.r[k][0] * cell.center[0] + at.r[k][1] * cell.center[1] + at.r[k][2] * cell.center[2] + at.t[k];
         size += std::abs(at.t[k]) + std::abs(cell.center[k]) + cell.half[k];
     }
-    const float more = margin + kSlack * size;
+    const float more = margin + kBoxSlack * size;
     for (size_t i = 0; i < 3; ++i) out.half[i] = cell.half[i] + more;
     for (size_t k = 0; k < 3; ++k) {
         out.extent[k] = more;
@@ -49,7 +47,7 @@ PROLATE_ROBOT_INLINE uint32_t meeting(const CellBlock& block, const PlacedCell& 
     // What the block's own numbers add to the error.
     const Floats reach = (block.half.x + block.half.y + block.half.z + absolute(block.center.x) +
                           absolute(block.center.y) + absolute(block.center.z)) *
-                         kSlack;
+                         kBoxSlack;
     for (size_t i = 0; i < 3; ++i) {
         const float* const n = b.axis[i];
         const Floats along = absolute(d.x * n[0] + d.y * n[1] + d.z * n[2]);
@@ -113,7 +111,7 @@ PROLATE_ROBOT_CLONES bool balls_meet(const std::vector<BallBlock>& a, const std:
                 const Floats3& center = balls.center;
                 const Floats3 d = {center.x - c[0], center.y - c[1], center.z - c[2]};
                 const Floats reach = absolute(center.x) + absolute(center.y) + absolute(center.z) + size;
-                const Floats near = balls.radius + others.radius[i] - reach * kSlack;
+                const Floats near = balls.radius + others.radius[i] - reach * kBoxSlack;
                 if (bits((balls.radius > zero) & (near > zero) & (dot(d, d) < near * near)) != 0) return true;
             }
         }
@@ -135,7 +133,7 @@ PROLATE_ROBOT_CLONES bool inner_meets(const BallBlock* balls, size_t count, cons
             squares = squares + beyond * beyond;
         }
         const Floats size = absolute(c.x) + absolute(c.y) + absolute(c.z) + size_of_box;
-        const Floats radius = ball->radius - size * kSlack;
+        const Floats radius = ball->radius - size * kBoxSlack;
         if (bits((radius > zero) & (squares < radius * radius)) != 0) return true;
     }
     return false;

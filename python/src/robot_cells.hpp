@@ -18,6 +18,9 @@
 
 namespace prolate::python {
 
+/// Of the lengths involved: what two boxes must be apart along an axis, see robot_cells.cpp.
+inline constexpr float kBoxSlack = 0x1p-18f;
+
 /// Eight boxes. Lanes that hold none have half extents of -infinity.
 struct alignas(32) CellBlock {
     Floats3 center, half;

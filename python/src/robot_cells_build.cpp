@@ -13,7 +13,6 @@
 namespace prolate::python {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr size_t kLevels = 3;     // of cells below the root: 512 leaves at most
 constexpr size_t kMostInner = 32; // balls
 

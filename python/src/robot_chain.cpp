@@ -6,13 +6,6 @@
 namespace prolate::python {
 namespace {
 
-using Quaternion = std::array<double, 4>;
-
-Quaternion product(const Quaternion& a, const Quaternion& b) noexcept {
-    return {
-        a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1], a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0],
-        a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3], a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]};
-}
 double length(const Point& v) noexcept {
     return std::hypot(v[0], v[1], v[2]);
 }
@@ -172,10 +165,6 @@ PROLATE_ROBOT_CLONES void place(const ChainJoint* joints, size_t count, const do
         child.extent = parent.extent + (step.far + joint->length);
         child.steps = parent.steps + (step.angle + 1.0);
     }
-}
-
-bool has_quaternion(const ChainJoint& joint) {
-    return joint.kind == JointKind::ball || joint.kind == JointKind::floating;
 }
 
 } // namespace

@@ -32,6 +32,10 @@ struct ChainJoint {
     double length = 0;                    ///< no less than what the joint adds to LinkFrames::extent while it is at 0
 };
 
+inline bool has_quaternion(const ChainJoint& joint) noexcept {
+    return joint.kind == JointKind::ball || joint.kind == JointKind::floating;
+}
+
 class Chain {
 public:
     /// What Python hands over, checked there: an array for each column, and a row for each joint.

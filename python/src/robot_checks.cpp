@@ -10,8 +10,6 @@
 namespace prolate::python {
 namespace {
 
-constexpr float kSlack = 0x1p-18f, kInfinity = std::numeric_limits<float>::infinity();
-
 template <class T> PROLATE_ROBOT_INLINE Floats along(const Floats3& v, const Lanes3<T>& n) {
     return v.x * n.x + v.y * n.y + v.z * n.z;
 }
@@ -26,7 +24,7 @@ PROLATE_ROBOT_CLONES void place_box(const RobotBody& body, const LinkFrames& at,
     out.axis[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)};
     out.axis[1] = {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)};
     out.axis[2] = {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)};
-    const Floats slack = (narrowed(at.extent) + static_cast<float>(body.reach)) * kSlack + rounded_up(body.slack);
+    const Floats slack = (narrowed(at.extent) + static_cast<float>(body.reach)) * kBoxSlack + rounded_up(body.slack);
     for (size_t k = 0; k < 3; ++k) out.half[k] = slack + cells.root.half[k];
     out.radius = slack + cells.radius;
 }
@@ -104,7 +102,7 @@ PlacedBox<float> standing(const RobotBody& body) {
     };
     if (body.kind == RobotBody::Kind::half_space) {
         out.axis[0] = vec({body.plane[0], body.plane[1], body.plane[2]});
-        out.radius = static_cast<float>(body.plane[3]) + 2 * kSlack * static_cast<float>(std::abs(body.plane[3]));
+        out.radius = static_cast<float>(body.plane[3]) + 2 * kBoxSlack * static_cast<float>(std::abs(body.plane[3]));
         return out;
     }
     const Cell& root = body.cells.root;
@@ -117,8 +115,8 @@ PlacedBox<float> standing(const RobotBody& body) {
         out.axis[k] = vec(rotated(body.pose, unit));
         size += static_cast<float>(std::abs(center[k])) + root.half[k];
     }
-    for (size_t k = 0; k < 3; ++k) out.half[k] = root.half[k] + kSlack * size;
-    out.radius = body.cells.radius + kSlack * size;
+    for (size_t k = 0; k < 3; ++k) out.half[k] = root.half[k] + kBoxSlack * size;
+    out.radius = body.cells.radius + kBoxSlack * size;
     return out;
 }
 

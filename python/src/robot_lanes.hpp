@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 // Sanitizers run before their own initialisation what the loader asks to choose a version.
 #if defined(__x86_64__) && defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&    \
@@ -21,6 +22,7 @@
 namespace prolate::python {
 
 inline constexpr size_t kLanes = 8;
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 using Floats [[gnu::vector_size(32)]] = float;
 using Ints [[gnu::vector_size(32)]] = int32_t;
 using Doubles [[gnu::vector_size(64)]] = double;

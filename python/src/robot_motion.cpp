@@ -18,16 +18,14 @@
 #include <cmath>
 
 namespace prolate::python {
-namespace {
 
 // Of one motion: how far each joint turns and shifts, from its start to its end.
 struct JointTravel {
     double turn = 0, shift = 0;
 };
 
-bool has_quaternion(const ChainJoint& joint) noexcept {
-    return joint.kind == JointKind::ball || joint.kind == JointKind::floating;
-}
+namespace {
+
 size_t first_of_quaternion(const ChainJoint& joint) noexcept {
     return joint.coordinate + (joint.kind == JointKind::floating ? 3 : 0);
 }
