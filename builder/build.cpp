@@ -11,6 +11,7 @@
 #include "builder/hulls.hpp"
 #include "builder/job.hpp"
 #include "builder/mass.hpp"
+#include "builder/options.hpp"
 #include "builder/resolution.hpp"
 
 #include "src/format.hpp"
@@ -54,7 +55,7 @@ private:
         mesh_ = source_.mesh.view();
         source_hash_ = hash(mesh_);
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
-        if (auto possible = check_lengths(); !possible) return possible.error();
+        if (auto possible = check_lengths(options_, box_.size()); !possible) return possible.error();
         return options_.exact ? bake_exact() : bake_ellipsoids();
     }
 
@@ -132,24 +133,6 @@ private:
                      .seconds = seconds_since(start_)};
     }
 
-    // Are the lengths that are asked for in range, for this mesh?
-    Result<void> check_lengths() const {
-        const double side = box_.size().maxCoeff();
-        const BallRange range = ball_range(side);
-        if (most_distance() < least_clearance(box_.size().norm(), options_.quality) * (1 - 1e-6))
-            return Error{ErrorCode::bad_options,
-                         "the clearance or distance is finer than distances are measured; "
-                         "ask for at least 0.01 % of the diagonal, with quality fast 0.1 %",
-                         0};
-        for (const float radius : {options_.fill, options_.keep_holes})
-            if (radius > 0 && (double{radius} < range.least || double{radius} > range.most))
-                return Error{ErrorCode::bad_options,
-                             "the ball of fill or keep_holes is too small or too large for this mesh; "
-                             "its radius may be 1/64 to 1/2 of the longest side of the mesh's box",
-                             0};
-        return {};
-    }
-
     // Can what is asked be done with this solid?
     Result<void> check(const Columns& columns) const {
         // Volume that may lie in several overlapping parts of a mesh, for the analytic method: share of the solid.
@@ -209,12 +192,7 @@ private:
         return std::max(kThinnestNodeOfMesh * box_.size().norm(), kThinnestNodeOfPlace * farthest);
     }
     bool closed() const { return report_.closed || options_.fill > 0; } // what is filled is closed
-    // The leaves' largest distance from the solid that is asked for, metres; HUGE_VAL: none is.
-    double most_distance() const {
-        const double share = 0.01 * double{options_.distance} * box_.size().norm();
-        return std::min(options_.distance > 0 ? share : HUGE_VAL,
-                        options_.clearance > 0 ? double{options_.clearance} : HUGE_VAL);
-    }
+    double most_distance() const { return prolate::most_distance(options_, box_.size().norm()); }
     // A volume as a share of the solid's.
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 

@@ -1,12 +1,14 @@
-// Checking and hashing of BuildOptions.
-#include <prolate/build.hpp>
-#include <prolate/version.hpp>
+// Checking and hashing of BuildOptions, by themselves and for a mesh.
+#include "builder/options.hpp"
 
 #include "builder/effort.hpp"
 
 #include "src/bytes.hpp"
 #include "src/hash.hpp"
 
+#include <prolate/version.hpp>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -49,6 +51,28 @@ double least_clearance(double diagonal, Quality quality) noexcept {
 
 BallRange ball_range(double longest_side) noexcept {
     return {longest_side / 64, longest_side / 2}; // two or more cells of the lattices of fill.cpp and passages.cpp
+}
+
+double most_distance(const BuildOptions& o, double diagonal) noexcept {
+    const double share = 0.01 * double{o.distance} * diagonal;
+    return std::min(o.distance > 0 ? share : HUGE_VAL, o.clearance > 0 ? double{o.clearance} : HUGE_VAL);
+}
+
+Result<void> check_lengths(const BuildOptions& o, const Vec& sides) {
+    const double diagonal = sides.norm();
+    if (most_distance(o, diagonal) < least_clearance(diagonal, o.quality) * (1 - 1e-6))
+        return Error{ErrorCode::bad_options,
+                     "the clearance or distance is finer than distances are measured; "
+                     "ask for at least 0.01 % of the diagonal, with quality fast 0.1 %",
+                     0};
+    const BallRange range = ball_range(sides.maxCoeff());
+    for (const float radius : {o.fill, o.keep_holes})
+        if (radius > 0 && (double{radius} < range.least || double{radius} > range.most))
+            return Error{ErrorCode::bad_options,
+                         "the ball of fill or keep_holes is too small or too large for this mesh; "
+                         "its radius may be 1/64 to 1/2 of the longest side of the mesh's box",
+                         0};
+    return {};
 }
 
 uint64_t hash(const BuildOptions& o) {
