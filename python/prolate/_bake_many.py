@@ -239,10 +239,15 @@ def _find(folder: str, source: int | None, options: int) -> Tree | None:
 
 def _write(path: str, content: bytes) -> None:
     """Atomically: workers on other machines read it meanwhile."""
-    import tempfile
+    import secrets
 
     os.makedirs(os.path.dirname(path), exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=os.path.dirname(path))
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-    os.replace(temporary, path)
+    temporary = f"{path}.{secrets.token_hex(8)}"  # open() gives it the rights that the user's umask leaves
+    try:
+        with open(temporary, "xb") as file:
+            file.write(content)
+        os.replace(temporary, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.remove(temporary)
+        raise

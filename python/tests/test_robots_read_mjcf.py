@@ -128,6 +128,7 @@ def test_joints_say_what_the_file_says(write):
 def test_pairs_that_never_collide(write):
     disabled = robots.load(write(ROBOT)).disabled
     assert disabled.pop(("free", "led")) == "exclude"
+    assert disabled.pop(("arm", "free")) == "adjacent"  # two joints are between them
     assert set(disabled) == {tuple(sorted(("apart", other))) for other in ("world", "free", "arm", "ball", "led")}
     assert set(disabled.values()) == {"contype and conaffinity"}
 

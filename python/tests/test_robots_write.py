@@ -55,7 +55,7 @@ def test_urdf_says_the_same_robot(only: str | None, bakes: Path, tmp_path: Path)
     check_read_again(tmp_path / "arm.urdf")
     text = (tmp_path / "arm.urdf").read_text()
     assert "ellipsoid" not in text.replace("ellipsoids", "") and max(map(len, text.splitlines())) < 8191
-    for mesh in (tmp_path / "arm_meshes").glob("*.obj"):
+    for mesh in (tmp_path / "arm.urdf_meshes").glob("*.obj"):
         assert {line[0] for line in mesh.read_text().splitlines()} == {"v", "f"}
 
 

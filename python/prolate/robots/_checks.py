@@ -48,9 +48,9 @@ class Checks:
     *Free* is certified, of the trees and of whatever they cover: joints in double precision, and what any rounding
     moves is added as a margin (some 1e-7 of a link's size). *May touch* is not: covers stick out.
 
-    Which pairs of links are looked at: all but those that a joint connects, those that no joint moves against each
-    other, and those that the description or ``allowed`` says may touch. What the root, or what is fixed to it, touches
-    in the scene, it touches in all configurations: leave it out of the scene, or allow it.
+    Which pairs of links are looked at: all but those that a joint connects (a floating one does not), those that no
+    joint moves against each other, and those that the description or ``allowed`` says may touch. What the root, or what
+    is fixed to it, touches in the scene, it touches in all configurations: leave it out of the scene, or allow it.
 
     Parameters
     ----------
@@ -77,9 +77,10 @@ class Checks:
     ) -> None:
         self.kinematics = Kinematics(description)
         names = self.kinematics.links
-        unknown = sorted(set(trees) - set(names))
-        if unknown:
-            raise ValueError(f"trees: the robot has no link {', '.join(unknown)}")
+        for argument, given in (("trees", trees), ("slack", slack or {})):
+            unknown = sorted(set(given) - set(names))
+            if unknown:
+                raise ValueError(f"{argument}: the robot has no link {', '.join(unknown)}")
         self._allowed = {frozenset(pair) for pair in allowed}
         wide = np.array([(slack or {}).get(name, 0.0) for name in names], dtype=np.float64)
         if not (wide >= 0).all():
@@ -245,14 +246,15 @@ class Checks:
 def _neighbours(description: Description) -> set[frozenset[str]]:
     """Pairs of links that a joint connects, or that nothing moves against each other.
 
-    Links that are fixed together are one body, so what a joint connects to one is a neighbour of all of them.
+    A floating joint connects nothing. Links that are fixed together are one body, so what a joint connects to one is a
+    neighbour of all of them.
     """
     body = {link.name: link.name for link in description.links}  # the first of those fixed together
     moving = []
     for joint in description.joints:
         if joint.kind == "fixed":
             body[joint.child] = body[joint.parent]
-        else:
+        elif joint.kind != "floating":
             moving.append(joint)
     connected = {frozenset((body[joint.parent], joint.child)) for joint in moving}
     names = list(body)

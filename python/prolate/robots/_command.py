@@ -41,6 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # of a reader that has seen enough, such as head
         sys.stderr.close()
         return DONE
+    except OSError as error:
+        print(f"prolate-robot: {error.filename or ''}: {error.strerror}", file=sys.stderr)
+        return IO
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -118,6 +118,7 @@ def _cache_folder() -> str:
 def _robot(options: argparse.Namespace, visuals: bool) -> Robot:
     from ._robot import Robot
 
+    _check(options)
     return Robot(load_as(options, visuals))
 
 
@@ -143,6 +144,16 @@ def _baked(robot: Robot, options: argparse.Namespace) -> BakedRobot:
         exact = robot.bake(exact=True, threads=options.threads)
         more = {name: value for name, value in given.items() if name not in ("clearance", "ellipsoids", "finer")}
         return mend(exact, baked, rounds=options.mend, **more)[0]
+
+
+def _check(options: argparse.Namespace) -> None:
+    """What would else come up only when the work is done."""
+    output = getattr(options, "output", None)
+    for given in (options.robot, options.srdf):
+        if output and given and os.path.realpath(output) == os.path.realpath(given):
+            raise ValueError(f"--output: {output} is read, too; choose another name")
+    if options.mend < 0:
+        raise ValueError(f"--mend: must be 0 or more, not {options.mend}")
 
 
 def _metres(option: str, text: str | None) -> float | None:

@@ -65,7 +65,7 @@ class Packages:
         if colon and scheme in ("package", "model"):
             package, _, inside = rest.partition("/")
             folders = self.candidates(package)
-            if not any(folder.is_dir() for folder in folders):
+            if not any(map(os.path.isdir, folders)):
                 raise MeshError(
                     f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
                     f"{self.description.resolve().parent}; say where with --package {package}=FOLDER (in Python "
@@ -79,9 +79,9 @@ class Packages:
     @staticmethod
     def _existing(name: str, paths: list[Path]) -> Path:
         for path in paths:
-            if path.is_file():
+            if os.path.isfile(path):  # also false of a name that no system takes
                 return path
-        there = next((path for path in paths if path.parent.is_dir()), paths[0])
+        there = next((path for path in paths if os.path.isdir(path.parent)), paths[0])
         raise MeshError(f"{name}: there is no file {there}; put it there, or correct the name")
 
 

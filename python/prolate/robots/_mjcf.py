@@ -32,6 +32,7 @@ from ._model import (
     Where,
 )
 from ._srdf import pair_of
+from ._writing import unique
 from ._xml import Notes, library, pose_matrix, quaternion_matrix
 
 if TYPE_CHECKING:
@@ -127,8 +128,9 @@ class MjcfReader:
 
     def robot(self) -> Parts:
         model = self.model
-        self.bodies = [self._name(body, "body") for body in sorted(self.spec.bodies, key=lambda body: body.id)]
         self.infos = sorted(self.spec.bodies, key=lambda body: body.id)
+        taken = {body.name for body in self.infos if body.name}
+        self.bodies = [body.name or unique(f"body{body.id}", taken) for body in self.infos]
         self.paired = {int(geom) for pair in (model.pair_geom1, model.pair_geom2) for geom in pair}
         self.geoms: dict[int, Any] = {geom.id: geom for geom in self.spec.geoms}
         followers = dict(self._mimics())
@@ -138,9 +140,6 @@ class MjcfReader:
             links += [Link(joint.child, where=joint.where) for joint in more[:-1]] + [link]
             joints += more
         return Parts(self.spec.modelname, links, joints, self._disabled(), self._home())
-
-    def _name(self, element: Any, what: str) -> str:
-        return str(element.name) or f"{what}{element.id}"
 
     def _link(self, body: int) -> Link:
         model, name = self.model, self.bodies[body]
@@ -304,10 +303,16 @@ class MjcfReader:
     # ---- pairs ----
 
     def _disabled(self) -> dict[tuple[str, str], str]:
-        """Pairs of bodies that MuJoCo never lets collide, but for those of parent and child."""
+        """Pairs of bodies that MuJoCo never lets collide, but for those that one joint connects."""
         model, out = self.model, {}
         for exclude in self.spec.excludes:
             out[pair_of(exclude.bodyname1, exclude.bodyname2)] = "exclude"
+        welded = [int(first) for first in model.body_weldid]  # of bodies that are fixed together, the first
+        for body, first in enumerate(welded):
+            above = welded[model.body_parentid[first]]
+            if model.body_jntnum[first] > 1 and above != 0:  # MuJoCo takes the world for no one's neighbour
+                for other in (i for i in range(model.nbody) if welded[i] == above):
+                    out.setdefault(pair_of(self.bodies[body], self.bodies[other]), "adjacent")
         masks = np.zeros((model.nbody, 2), dtype=np.int64)  # contype and conaffinity of all geoms
         for geom in range(model.ngeom):
             masks[model.geom_bodyid[geom]] |= model.geom_contype[geom], model.geom_conaffinity[geom]

@@ -94,6 +94,10 @@ class Robot:
             threads=threads,
             cache=None if cache is None else os.path.abspath(path_of("cache", cache)),
         )
+        if ellipsoids is not None and ellipsoids < 1:
+            raise ValueError(f"ellipsoids: must be 1 or more, not {ellipsoids}")
+        if not 0 <= threads <= 1024:
+            raise ValueError(f"threads: must be 0 ... 1024, not {threads}")
         if max_hull_vertices < 8:
             raise ValueError(f"max_hull_vertices: must be 8 or more, not {max_hull_vertices}")
         if not 1 <= max_ellipsoids <= 65536:

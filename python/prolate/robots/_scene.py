@@ -83,6 +83,7 @@ class Scene:
             self.native.add_capsule(row[:3] - middle, row[3:6] - middle, row[6], at @ _shift(middle))
         elif isinstance(shape, HalfSpace):
             row = numbers(shape)[1]
+            _check_rigid(at)
             normal = at[:3, :3] @ row[:3]
             self.native.add_half_space(np.append(normal, row[3] + normal @ at[:3, 3]))
         elif isinstance(shape, PointCloud):
@@ -105,6 +106,11 @@ def _shift(by: ArrayLike) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     out = np.eye(4)
     out[:3, 3] = by
     return out
+
+
+def _check_rigid(at: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
+    """As the native side does it, for a shape that has no frame there."""
+    _core.RobotScene().add_points(np.zeros((1, 3)), 0.0, at)
 
 
 def matrix_of(name: str, pose: ArrayLike) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

@@ -32,6 +32,7 @@ from ._model import (
     SphereShape,
 )
 from ._sdf_frames import SdfFrames
+from ._srdf import pair_of
 from ._xml import BadElement, Notes, name_of, pose_matrix
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ class SdfReader(SdfFrames):
         super().__init__(path, notes)
         self.meshes, self.visuals = meshes, visuals
         self.old_axes = False
+        self.adjacent: list[tuple[str, str]] = []  # links that a joint of two axes connects
 
     def robot(self, root: Element) -> Parts:
         version = tuple(int(part) for part in (root.get("version") or "1.6").split(".")[:2] if part.isdigit())
@@ -72,7 +74,7 @@ class SdfReader(SdfFrames):
         joints = list(self._joints(model, ""))
         if any("world" in (joint.parent, joint.child) for joint in joints):
             links = [Link("world", where=self.where(model)), *links]
-        return Parts(name, links, joints)
+        return Parts(name, links, joints, dict.fromkeys(self.adjacent, "adjacent"))
 
     def _name_contents(self, model: Element) -> None:
         self.name_others(model, {*_MODEL, "include"}, self.notes)
@@ -146,7 +148,10 @@ class SdfReader(SdfFrames):
             a, b, c = self.sizes(shape, "radii", 3)
             return EllipsoidShape((a, b, c)), here
         if kind == "plane":
-            return PlaneShape(), pose_matrix((0, 0, 0), _turn_to(self.numbers(shape, "normal", 3, (0, 0, 1))))
+            normal = self.numbers(shape, "normal", 3, (0, 0, 1))
+            if not np.linalg.norm(normal) > 0:
+                raise self.fail(shape, "its normal has no direction")
+            return PlaneShape(), pose_matrix((0, 0, 0), _turn_to(normal))
         raise self.fail(shape, "is not understood; use box, sphere, cylinder, capsule, ellipsoid or mesh")
 
     def _mesh(self, element: Element, link: str) -> Shape:
@@ -190,6 +195,7 @@ class SdfReader(SdfFrames):
                     self.notes.bad(error, left_out="the joint")
 
     def _joint(self, element: Element, name: str, scope: str) -> Iterator[Joint]:
+        self.text(element, "name")
         stated = self.text(element, "type")
         self.name_others(element, {"pose", "parent", "child", "axis", "axis2"}, self.notes)
         ends = [self.child(element, end) for end in ("parent", "child")]
@@ -206,6 +212,7 @@ class SdfReader(SdfFrames):
         elif stated in _TWO_AXES:
             self.notes.add("info", f"joint {name}: is {stated}; it becomes two, with a link between", where, child)
             middle = f"{name}::between"
+            self.adjacent.append(pair_of(parent, child))
             yield self._moving(element, "axis", name, "revolute", (parent, middle), origin, (child, scope))
             yield self._moving(element, "axis2", f"{name}::2", "revolute", (middle, child), np.eye(4), (child, scope))
         else:

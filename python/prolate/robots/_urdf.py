@@ -40,7 +40,7 @@ _JOINTS: dict[str, JointKind] = {
     "fixed": "fixed", "revolute": "revolute", "continuous": "continuous", "prismatic": "prismatic", "planar": "planar",
     "floating": "floating",
 }  # fmt: skip
-_NO_LIMIT = 1e15  # what exporters write for it
+_NO_LIMIT = 1e9  # what exporters write for it, write_urdf() as well
 
 
 class UrdfReader(Reader):

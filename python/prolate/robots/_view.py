@@ -6,6 +6,7 @@ import base64
 import html
 import json
 import os
+import re
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Union
 
@@ -46,10 +47,8 @@ def view_page(baked: BakedRobot) -> str:
     folder = resources.files("prolate.robots")
     page, script = ((folder / name).read_text("utf-8") for name in ("view.html", "view.js"))
     data = json.dumps(robot, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    for mark, text in (("@TITLE@", html.escape(baked.description.name)), ("@SCRIPT@", script), ("@ROBOT@", data)):
-        before, after = page.split(mark)
-        page = before + text + after
-    return page
+    parts = {"TITLE": html.escape(baked.description.name), "SCRIPT": script, "ROBOT": data}
+    return re.sub("@(TITLE|SCRIPT|ROBOT)@", lambda mark: parts[mark[1]], page)
 
 
 def write_view(baked: BakedRobot, path: Union[str, os.PathLike[str]]) -> None:
@@ -59,8 +58,10 @@ def write_view(baked: BakedRobot, path: Union[str, os.PathLike[str]]) -> None:
     ------
     Error
         ``code`` is ``"io"``.
+    ValueError
+        ``path`` is the description itself.
     """
-    files = Files.at(path)
+    files = Files.at(path, baked.description)
     files.contents[files.path] = view_page(baked).encode()
     files.write()
 

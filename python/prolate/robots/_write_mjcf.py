@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Union
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from .. import __version__
+from .._errors import Error
 from ._baked import BakedRobot
 from ._model import (
     BoxShape,
@@ -49,7 +51,7 @@ def write_mjcf(
     Parameters
     ----------
     path : path-like
-        Visual meshes go into the folder ``NAME_meshes`` beside it.
+        Visual meshes go into the folder ``PATH_meshes`` beside it.
     floating : bool
         Let the root move freely; or else it is fixed to the world.
     visuals : bool
@@ -60,9 +62,11 @@ def write_mjcf(
     Raises
     ------
     Error
-        ``code`` is ``"io"``.
+        ``code`` is ``"unsupported"`` for a floating joint that does not hang on the world, or ``"io"``.
+    ValueError
+        ``path`` is what the robot was read from.
     """
-    _Mjcf(robot, Files.at(path), visuals).write(floating, exclude)
+    _Mjcf(robot, Files.at(path, robot.description), visuals).write(floating, exclude)
 
 
 class _Mjcf:
@@ -71,6 +75,7 @@ class _Mjcf:
         self.description: Description = robot.description
         self.root = Element("mujoco", model=self.description.name or "robot")
         self.names: set[str] = set()
+        self.bodies: dict[str, str] = {}  # those that are not called as their links
         self.assets: dict[str, str] = {}
 
     def write(self, floating: bool, exclude: Iterable[tuple[str, str]]) -> None:
@@ -89,10 +94,20 @@ class _Mjcf:
         self.asset = SubElement(self.root, "asset")
         world = SubElement(self.root, "worldbody")
         bodies: dict[str, Element] = {}
+        if floating or self.description.links[0].name != "world":  # MuJoCo has a body of this name
+            self.bodies["world"] = unique("world", {"world", *(link.name for link in self.description.links)})
         joints = {joint.child: joint for joint in self.description.joints}
         for link in self._parents_first():
             joint = joints.get(link.name)
-            body = SubElement(bodies[joint.parent] if joint else world, "body", name=link.name)
+            if joint is None and link.name == "world" and not floating:
+                bodies[link.name] = world
+                self._fill(world, replace(link, inertial=None))
+                continue
+            if joint and joint.kind == "floating" and bodies[joint.parent] is not world:
+                why = "MuJoCo lets only bodies of the world move freely"
+                raise Error(f"{joint.where}: joint {joint.name}: {why}", "unsupported")
+            name = self.bodies.get(link.name, link.name)
+            body = SubElement(bodies[joint.parent] if joint else world, "body", name=name)
             bodies[link.name] = body
             if joint is not None:
                 body.attrib.update(_frame(joint.origin))
@@ -157,7 +172,7 @@ class _Mjcf:
             pairs |= self._next_to_root()
         contact = SubElement(self.root, "contact")
         for one, other in sorted(pair for pair in pairs if set(pair) <= set(self.robot.covers)):
-            SubElement(contact, "exclude", body1=one, body2=other)
+            SubElement(contact, "exclude", body1=self.bodies.get(one, one), body2=self.bodies.get(other, other))
 
     def _next_to_root(self) -> set[tuple[str, ...]]:
         """MuJoCo takes links that fixed joints hold together as one, and ignores contacts of each with the one before
@@ -167,7 +182,7 @@ class _Mjcf:
         for joint in self.description.joints:
             if joint.kind == "fixed":
                 group[joint.child] = group[joint.parent]
-            else:
+            elif joint.kind != "floating":
                 before[joint.child] = group[joint.parent]
         first = self.description.links[0].name
         base = [link for link in group if group[link] == first]
@@ -261,8 +276,8 @@ def _add_joint(body: Element, joint: Joint) -> None:
         found.set("axis", text(*joint.axis))
         if joint.zero:
             found.set("ref", text(joint.zero))
-        if np.isfinite([joint.lower, joint.upper]).all() and joint.kind != "continuous":
-            found.set("range", text(joint.lower, joint.upper))
+        if np.isfinite([joint.lower, joint.upper]).any() and joint.kind != "continuous":
+            found.set("range", text(*_range(joint)))
         if np.isfinite(joint.effort) and joint.effort > 0:
             found.set("actuatorfrcrange", text(-joint.effort, joint.effort))
     if any(joint.anchor):
@@ -274,8 +289,17 @@ def _add_joint(body: Element, joint: Joint) -> None:
 
 
 def _across(axis: Matrix) -> tuple[Matrix, Matrix]:
-    """Two unit vectors that make a right-handed frame with the axis."""
-    least = np.eye(3)[int(np.abs(axis).argmin())]
-    x = np.cross(least, axis)
-    x /= np.linalg.norm(x)
-    return x, np.cross(axis, x)
+    """Two unit vectors that make a right-handed frame with the axis: those of python/src/robot_chain.cpp, so that q
+    means the same."""
+    x, y, z = axis
+    s = -1.0 if z < 0 else 1.0
+    b = -1 / (s + z)
+    return np.array([1 + s * x * x * b, s * x * y * b, -s * x]), np.array([x * y * b, s + y * y * b, -y])
+
+
+def _range(joint: Joint) -> tuple[float, float]:
+    """MuJoCo wants two numbers, the second above the first. 1e9 is no limit that a robot reaches."""
+    lower, upper = (float(np.clip(limit, -1e9, 1e9)) for limit in (joint.lower, joint.upper))
+    if upper > lower:
+        return lower, upper
+    return lower - 1e-9 * max(1.0, abs(lower)), upper + 1e-9 * max(1.0, abs(upper))

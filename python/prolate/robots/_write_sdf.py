@@ -26,7 +26,7 @@ from ._model import (
     SphereShape,
 )
 from ._rebase import rebased
-from ._writing import Files, roll_pitch_yaw, text
+from ._writing import Files, roll_pitch_yaw, text, unique
 
 _KINDS = {
     "fixed": "fixed",
@@ -45,7 +45,7 @@ def write_sdf(
     Parameters
     ----------
     path : path-like
-        Meshes go into the folder ``NAME_meshes`` beside it, as OBJ.
+        Meshes go into the folder ``PATH_meshes`` beside it, as OBJ.
     floating : bool
         Let the root move freely; or else a joint fixes it to the world.
     visuals : bool
@@ -55,8 +55,10 @@ def write_sdf(
     ------
     Error
         ``code`` is ``"unsupported"`` for a joint that SDF cannot have, a planar or a floating one, or ``"io"``.
+    ValueError
+        ``path`` is what the robot was read from.
     """
-    _Sdf(rebased(robot), Files.at(path), visuals).write(floating)
+    _Sdf(rebased(robot), Files.at(path, robot.description), visuals).write(floating)
 
 
 class _Sdf:
@@ -64,25 +66,35 @@ class _Sdf:
         self.robot, self.files, self.visuals = robot, files, visuals
         self.root = Element("sdf", version="1.11")
         self.model = SubElement(self.root, "model", name=robot.description.name or "robot")
+        # No two elements of a model may have one name, "world" is SDF's own, and :: leads into a model.
+        taken = {"world"}
+        links, joints = robot.description.links, robot.description.joints
+        self.links = {link.name: unique(link.name.replace("::", "_"), taken) for link in links}
+        self.joints = {joint.name: unique(joint.name.replace("::", "_"), taken) for joint in joints}
+        self.to_world = unique("fixed_to_world", taken)
 
     def write(self, floating: bool) -> None:
         description = self.robot.description
         above = {joint.child: joint.name for joint in description.joints}
+        root = description.links[0]
+        if root.name == "world" and not (floating or root.visuals or root.name in self.robot.covers):
+            self.links["world"] = "world"
         for link in description.links:
-            self._link(link, above.get(link.name))
-        if not floating:
-            fixed = SubElement(self.model, "joint", name="fixed_to_world", type="fixed")
+            if self.links[link.name] != "world":
+                self._link(link, above.get(link.name))
+        if not floating and self.links[root.name] != "world":
+            fixed = SubElement(self.model, "joint", name=self.to_world, type="fixed")
             _leaf(fixed, "parent", "world")
-            _leaf(fixed, "child", description.links[0].name)
+            _leaf(fixed, "child", self.links[root.name])
         for joint in description.joints:
             self._joint(joint)
         self.files.xml(self.root, f"written by prolate {__version__}")
         self.files.write()
 
     def _link(self, link: Link, joint: str | None) -> None:
-        element = SubElement(self.model, "link", name=link.name)
+        element = SubElement(self.model, "link", name=self.links[link.name])
         if joint is not None:
-            SubElement(element, "pose", relative_to=joint).text = "0 0 0 0 0 0"
+            SubElement(element, "pose", relative_to=self.joints[joint]).text = "0 0 0 0 0 0"
         if link.inertial is not None:
             _add_inertial(element, link.inertial)
         cover = self.robot.covers.get(link.name)
@@ -116,16 +128,17 @@ class _Sdf:
     def _joint(self, joint: Joint) -> None:
         if joint.kind not in _KINDS:
             raise Error(f"{joint.where}: joint {joint.name}: SDF has no joints of kind {joint.kind}", "unsupported")
-        element = SubElement(self.model, "joint", name=joint.name, type=_KINDS[joint.kind])
-        SubElement(element, "pose", relative_to=joint.parent).text = _pose(joint.origin)
-        _leaf(element, "parent", joint.parent)
-        _leaf(element, "child", joint.child)
+        element = SubElement(self.model, "joint", name=self.joints[joint.name], type=_KINDS[joint.kind])
+        parent = self.links[joint.parent]
+        SubElement(element, "pose", relative_to="__model__" if parent == "world" else parent).text = _pose(joint.origin)
+        _leaf(element, "parent", parent)
+        _leaf(element, "child", self.links[joint.child])
         if joint.kind in ("fixed", "ball"):
             return
         axis = SubElement(element, "axis")
         _leaf(axis, "xyz", text(*joint.axis))
         if joint.mimic is not None:
-            mimic = SubElement(axis, "mimic", joint=joint.mimic.joint)
+            mimic = SubElement(axis, "mimic", joint=self.joints[joint.mimic.joint])
             _leaf(mimic, "multiplier", text(joint.mimic.multiplier))
             _leaf(mimic, "offset", text(joint.mimic.offset))
             _leaf(mimic, "reference", "0")

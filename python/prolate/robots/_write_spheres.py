@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from typing import Union
 
@@ -21,12 +22,12 @@ def write_spheres(robot: BakedRobot, path: Union[str, os.PathLike[str]]) -> None
     """
     lines = ["collision_spheres:"]
     for cover in robot.covers.values():
-        lines.append(f"  {_quoted(cover.name)}:")
+        lines.append(f"  {json.dumps(cover.name)}:")
         for center, radius in spheres_of(cover):
             x, y, z = center
             lines.append(f"    - center: [{x!r}, {y!r}, {z!r}]")
             lines.append(f"      radius: {radius!r}")
-    files = Files.at(path)
+    files = Files.at(path, robot.description)
     files.contents[files.path] = ("\n".join(lines) + "\n").encode()
     files.write()
 
@@ -44,7 +45,3 @@ def spheres_of(cover: LinkCover) -> list[tuple[tuple[float, float, float], float
         x, y, z = (float(value) for value in one.pose[:3, 3])
         found.append(((x, y, z), float(one.shape.radius)))
     return found
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -49,7 +49,7 @@ def write_urdf(
     Parameters
     ----------
     path : path-like
-        Meshes go into the folder ``NAME_meshes`` beside it, as OBJ.
+        Meshes go into the folder ``PATH_meshes`` beside it, as OBJ.
     ellipsoids : {"mesh", "drake"}
         URDF has no ellipsoids. Write polyhedra around them, or ``<drake:ellipsoid>``, which only Drake reads.
     visuals : bool
@@ -60,11 +60,11 @@ def write_urdf(
     Error
         ``code`` is ``"unsupported"`` for a joint that URDF cannot have, a ball, or ``"io"``.
     ValueError
-        For an option.
+        For an option, or if ``path`` is what the robot was read from.
     """
     if ellipsoids not in ("mesh", "drake"):
         raise ValueError(f'ellipsoids: must be "mesh" or "drake", not {ellipsoids!r}')
-    _Urdf(rebased(robot), Files.at(path), ellipsoids, visuals).write()
+    _Urdf(rebased(robot), Files.at(path, robot.description), ellipsoids, visuals).write()
 
 
 class _Urdf:
@@ -154,7 +154,7 @@ class _Urdf:
 
 def _kind(joint: Joint) -> str:
     """A hinge without limits is continuous."""
-    bounded = np.isfinite([joint.lower, joint.upper]).all()
+    bounded = np.isfinite([joint.lower, joint.upper]).any()
     return "continuous" if joint.kind == "revolute" and not bounded else joint.kind
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from .._bake_many import _write as write_atomically
 from .._errors import Error, path_of
-from ._model import Matrix, MeshShape
+from ._model import Description, Matrix, MeshShape
 
 
 def text(*values: float) -> str:
@@ -46,16 +46,20 @@ def roll_pitch_yaw(rotation: Matrix) -> tuple[float, float, float]:
 
 @dataclass
 class Files:
-    """Files that belong together: written when all are ready, and ``path``, which names the others, last."""
+    """Files that belong together: written when all are ready, and ``path``, which names the others, last.
+
+    None of them may be one that the robot was read from, which are ``inputs``.
+    """
 
     path: Path
+    inputs: frozenset[Path] = frozenset()
     contents: dict[Path, bytes] = field(default_factory=dict)
     _meshes: dict[tuple[int, int], str] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
 
     @classmethod
-    def at(cls, path: Union[str, os.PathLike[str]]) -> Files:
-        return cls(Path(path_of("path", path)))
+    def at(cls, path: Union[str, os.PathLike[str]], robot: Description | None = None) -> Files:
+        return cls(Path(path_of("path", path)), frozenset() if robot is None else _inputs(robot))
 
     def mesh(self, name: str, shape: MeshShape, *, kind: Literal["obj", "stl"] = "obj") -> str:
         """The name, relative to ``path``, of a file of this mesh; shapes of the same arrays share one.
@@ -65,7 +69,7 @@ class Files:
         key = (id(shape.vertices), id(shape.faces))
         if key not in self._meshes:
             safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
-            relative = f"{self.path.stem}_meshes/{unique(safe, self._names)}.{kind}"
+            relative = f"{self.path.name}_meshes/{unique(safe, self._names)}.{kind}"
             self.contents[self.path.parent / relative] = _obj(shape) if kind == "obj" else _stl(shape)
             self._meshes[key] = relative
         return self._meshes[key]
@@ -77,7 +81,10 @@ class Files:
         self.contents[self.path] = f'<?xml version="1.0"?>\n<!-- {comment} -->\n{body}\n'.encode()
 
     def write(self) -> None:
-        """Raises Error, ``code`` ``"io"``."""
+        """Raises Error, ``code`` ``"io"``, and ValueError for a path that would overwrite an input."""
+        for path in self.contents:
+            if path.resolve() in self.inputs:
+                raise ValueError(f"path: {path} is what the robot was read from; choose another name for the output")
         last = self.contents[self.path]
         others = [item for item in self.contents.items() if item[0] != self.path]
         for path, content in [*others, (self.path, last)]:
@@ -85,6 +92,13 @@ class Files:
                 write_atomically(os.fspath(path.absolute()), content)
             except OSError as error:
                 raise Error(f"{error.strerror}: {path}", "io", error.errno or 0) from None
+
+
+def _inputs(robot: Description) -> frozenset[Path]:
+    """The description, and the meshes that it names."""
+    shapes = (one.shape for link in robot.links for one in (*link.collisions, *link.visuals))
+    meshes = (shape.path for shape in shapes if isinstance(shape, MeshShape) and shape.path)
+    return frozenset(path.resolve() for path in (robot.source, *meshes))
 
 
 def _obj(shape: MeshShape) -> bytes:

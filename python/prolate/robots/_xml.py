@@ -131,8 +131,10 @@ class Reader:
 
 
 def name_of(element: Element) -> str:
-    """Its tag, with the namespace's prefix if it has one."""
-    tag = str(element.tag).rpartition("}")[2]
+    """Its tag, with the namespace's prefix if it has one; of an entity, which is not followed, ``&name;``."""
+    if not isinstance(element.tag, str):
+        return str(element.text)
+    tag = element.tag.rpartition("}")[2]
     return f"{element.prefix}:{tag}" if element.prefix else tag
 
 
