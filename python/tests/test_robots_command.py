@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from robot_files import TETRAHEDRON
 
@@ -137,6 +138,17 @@ def test_view_writes_a_page(bodies, tmp_path):
     pytest.importorskip("scipy")
     assert main(["view", "robot.urdf", "-o", "robot.html"]) == 0
     assert "<html" in (tmp_path / "robot.html").read_text()
+
+
+def test_render_draws_a_picture(bodies, tmp_path, capsys):
+    pytest.importorskip("scipy")
+    image = pytest.importorskip("PIL.Image")
+    words = ["render", "robot.urdf", "-o", "robot.png", "--size", "120,90", "--from=-30,10"]
+    assert main([*words, "--q=-0.5"]) == 0
+    picture = np.asarray(image.open(tmp_path / "robot.png"))
+    assert picture.shape == (90, 120, 3) and len(np.unique(picture.reshape(-1, 3), axis=0)) > 20
+    assert main([*words, "--q=1,2,3,4,5,6,7"]) == 2
+    assert "q" in capsys.readouterr().err
 
 
 def test_touch_writes_srdf(bodies, tmp_path, capsys):

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from .._errors import Error
-from ._command_bake import add_bake, add_convert, add_touch, add_view
+from ._command_bake import add_bake, add_convert, add_render, add_touch, add_view
 from ._command_read import BAD_INPUT, DONE, INTERNAL, INTERRUPTED, IO, USAGE, add_info
 
 _CODES = {"bad_options": USAGE, "io": IO, "out_of_memory": IO, "unsupported": USAGE, "internal": INTERNAL}
@@ -18,6 +18,7 @@ examples:
   prolate-robot bake panda.urdf --clearance 5mm
   prolate-robot convert talos.urdf --package talos_data=/opt/robots/talos_data -o talos.xml
   prolate-robot view panda.urdf -o panda.html
+  prolate-robot render panda.urdf -o panda.png --q 0,-0.8,0,-2.4,0,1.6,0.8,0.04
   prolate-robot touch panda.urdf -o panda.srdf
 
 exit codes: 0 done, 1 done but for some links, which are named, 2 wrong usage, 3 nothing of a robot can be read, 4
@@ -55,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for add in (add_info, add_bake, add_convert, add_view, add_touch):
+    for add in (add_info, add_bake, add_convert, add_view, add_render, add_touch):
         add(commands)
     return parser
 

@@ -1,14 +1,17 @@
-"""``bake``, ``convert``, ``view`` and ``touch`` of ``prolate-robot``."""
+"""``bake``, ``convert``, ``view``, ``render`` and ``touch`` of ``prolate-robot``."""
 
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from typing import TYPE_CHECKING, Any
 
+from .._errors import Error
 from .._mesh import length
 from ._command_read import DONE, NO, add_command, load_as, pair, say
+from ._writing import Files
 
 if TYPE_CHECKING:
     from ._baked import BakedRobot
@@ -62,6 +65,33 @@ def add_view(commands: Any) -> None:
     )
     view.add_argument("-o", "--output", metavar="PAGE.html", required=True, help="where to; replaced if it is there")
     _add_goals(view)
+
+
+def add_render(commands: Any) -> None:
+    render = add_command(
+        commands,
+        "render",
+        _render,
+        "draw the robot and its covers",
+        "Draws one picture, as a PNG: covers transparent over meshes, or coloured by how far they stick out. Links "
+        "that may touch are red.",
+    )
+    render.add_argument(
+        "-o", "--output", metavar="PICTURE.png", required=True, help="where to; replaced if it is there"
+    )
+    render.add_argument("--q", metavar="Q", type=_numbers, help="--q=0.1,-0.5: the configuration; else its home")
+    render.add_argument("--size", metavar="W,H", type=_numbers, default=(1200, 900), help="pixels (1200,900)")
+    render.add_argument(
+        "--from",
+        metavar="AZIMUTH,ELEVATION",
+        dest="view",
+        type=_numbers,
+        default=(-50, 20),
+        help="degrees (--from=-50,20)",
+    )
+    render.add_argument("--covers", choices=["colour", "heat", "none"], default="colour", help="(%(default)s)")
+    render.add_argument("--no-meshes", action="store_true", help="covers alone")
+    _add_goals(render)
 
 
 def add_touch(commands: Any) -> None:
@@ -212,6 +242,35 @@ def _view(options: argparse.Namespace) -> int:
     robot = _baked(_robot(options, visuals=False), options)
     write_view(robot, options.output)
     return _outcome(robot, options.quiet)
+
+
+def _render(options: argparse.Namespace) -> int:
+    try:
+        from PIL import Image
+    except ImportError:
+        raise Error("pictures are written by Pillow: pip install pillow", "unsupported") from None
+    from ._render import render
+
+    if len(options.size) != 2 or len(options.view) != 2:
+        raise ValueError("--size and --from: must be two numbers, with a comma")
+    robot = _baked(_robot(options, visuals=False), options)
+    width, height = map(int, options.size)
+    pixels = render(
+        robot, options.q, size=(width, height), view=options.view, covers=options.covers, meshes=not options.no_meshes
+    )
+    png = io.BytesIO()
+    Image.fromarray(pixels).save(png, "png")
+    files = Files.at(options.output)
+    files.contents[files.path] = png.getvalue()
+    files.write()
+    return _outcome(robot, options.quiet)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be numbers with commas, not {text!r}") from None
 
 
 def _touch(options: argparse.Namespace) -> int:
