@@ -180,3 +180,11 @@ BAD = {
 def test_bad_elements_are_named(tmp_path: Path, said: str) -> None:
     (tmp_path / "bad.robot").write_text(BAD[said])
     assert any(said in note.text for note in robots.load(tmp_path / "bad.robot").notes)
+
+
+def test_a_link_that_misses_a_part_is_not_proved(tmp_path: Path) -> None:
+    path = tmp_path / "part.urdf"
+    mesh = '<collision><geometry><mesh filename="no.stl"/></geometry></collision>'
+    path.write_text(f'<robot><link name="a">{BOX}{mesh}</link></robot>')
+    for baked in (robots.Robot.load(path).bake(), robots.Robot.load(path).bake(exact=True)):
+        assert list(baked.covers) == ["a"] and not baked.proved

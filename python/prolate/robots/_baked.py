@@ -88,13 +88,17 @@ class BakedRobot:
 
     @property
     def proved(self) -> bool:
-        """Is every link covered, and proved to be?"""
-        complete = all(link.name in self.covers for link in self.description.links if is_solid(link))
-        return complete and all(cover.proved for cover in self.covers.values())
+        """Is every link covered, and proved to be? Not so if the notes have an error: something of it is missing."""
+        whole = all(note.kind != "error" for note in (*self.description.notes, *self.notes))
+        covered = all(link.name in self.covers for link in self.description.links if is_solid(link))
+        return whole and covered and all(cover.proved for cover in self.covers.values())
 
     @cached_property
     def checks(self) -> Checks:
-        """What planners ask. Made when it is first asked for; ``Checks(...)`` itself takes pairs that may touch."""
+        """What planners ask, of what is covered: see :attr:`proved`.
+
+        Made when it is first asked for; ``Checks(...)`` itself takes pairs that may touch.
+        """
         trees = {name: cover.tree for name, cover in self.covers.items()}
         return Checks(self.description, trees, slack={name: cover.rounding for name, cover in self.covers.items()})
 
