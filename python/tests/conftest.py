@@ -90,3 +90,9 @@ def cover():
 def bakes(tmp_path_factory):
     """A cache of bakes that all tests share."""
     return tmp_path_factory.mktemp("bakes")
+
+
+@pytest.fixture
+def own_folder(tmp_path, monkeypatch):
+    """The current folder: MuJoCo leaves MUJOCO_LOG.TXT there."""
+    monkeypatch.chdir(tmp_path)

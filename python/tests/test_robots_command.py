@@ -11,6 +11,8 @@ from robot_files import TETRAHEDRON
 pytest.importorskip("lxml")
 from prolate.robots._command import main
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 ROBOT = """<robot name="r">
 <link name="a"><collision><geometry><mesh filename="package://parts/part.obj" scale="1 1 2"/></geometry></collision>
 <inertial><mass value="1.5"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 from robot_parts import arm, baked, distance_to_l, l_shape, points_of_l, pose, wedge
 
+from prolate.robots._baking import _measured
 from prolate.robots._covers import SINGLE, Options, Solid
-from prolate.robots._fits import around, hull_within
+from prolate.robots._fits import around, hull_within, thickened
 from prolate.robots._measure import beyond, farthest
-from prolate.robots._model import BoxShape, EllipsoidShape, Geometry, Link, MeshShape
+from prolate.robots._model import BoxShape, Description, EllipsoidShape, Geometry, Link, MeshShape
+from prolate.robots._pieces import Pieces
 from prolate.robots._proof import holds_ellipsoids, holds_points
 from prolate.robots._robot import Robot
-from prolate.robots._solids import grown, inverse, moved, polyhedron, volume
+from prolate.robots._solids import grown, hull_triangles, inverse, merged, moved, polyhedron, volume
 
 
 def cloud(seed: int) -> np.ndarray:
@@ -86,7 +88,7 @@ def test_covers_hold_all_points_and_say_how_far_they_stick_out(only: str | None,
     assert farthest <= cover.clearance <= 1.5 * farthest
     limit = 0.1 if only is None else 0.2
     assert cover.clearance <= limit or only in ("sphere", "capsule", "cylinder", "box")
-    assert cover.kind == (only or "ellipsoids")
+    assert cover.kind == (only or "hull")
     assert ("base" in [note.link for note in robot.notes]) == (cover.clearance > limit)
 
 
@@ -95,7 +97,7 @@ def test_what_is_convex_gets_its_hull_and_primitives_stay(bakes: Path) -> None:
     elbow = robot.covers["elbow"]
     assert elbow.kind == "hull" and elbow.outside_ratio < 1e-3 and elbow.clearance <= 0.005
     assert elbow.geometries[0] is robot.description.links[1].collisions[1]
-    assert robot.covers["base"].kind == "ellipsoids"
+    assert robot.covers["base"].kind == "hull" and len(robot.covers["base"].geometries) > 1
     rounder = baked("spheres", bakes).covers["elbow"]
     assert rounder.kind == "spheres" and not any(isinstance(one.shape, BoxShape) for one in rounder.geometries)
 
@@ -105,8 +107,10 @@ def test_a_budget_is_kept_and_spent_where_it_gains(bakes: Path) -> None:
     for robot, count in ((few, 4), (many, 20)):
         assert robot.proved and sum(cover.cost for cover in robot.covers.values()) <= count
     assert len(few.covers["elbow"].geometries) == len(many.covers["elbow"].geometries) == 2  # nothing can gain there
-    assert few.covers["base"].kind == "hull" and len(many.covers["base"].geometries) == 16
+    assert len(few.covers["base"].geometries) == 1 and len(many.covers["base"].geometries) > 1
     assert many.covers["base"].outside_volume < few.covers["base"].outside_volume
+    smooth = Robot(arm()).bake(ellipsoids=20, only="ellipsoids", cache=bakes)
+    assert smooth.proved and 8 < sum(cover.cost for cover in smooth.covers.values()) <= 20
 
 
 def test_farthest_is_a_bound_and_not_a_loose_one() -> None:
@@ -164,3 +168,77 @@ def test_bad_arguments() -> None:
         robot.bake(finer={"hand": "5 miles"})
     with pytest.raises(ValueError, match="no link"):
         robot.bake(finer={"foot": 0.001})
+
+
+def bowl(floor: bool = True) -> MeshShape:
+    """Four walls, 2 cm thick, of a box of 40 x 30 x 20 cm that is open above, and a floor; closed, far from convex."""
+    slabs = [((0, 0, 0), (0.4, 0.02, 0.2)), ((0, 0.28, 0), (0.4, 0.3, 0.2))]
+    slabs += [((0, 0, 0), (0.02, 0.3, 0.2)), ((0.38, 0, 0), (0.4, 0.3, 0.2))]
+    slabs += [((0, 0, 0), (0.4, 0.3, 0.02))] if floor else []
+    place = pose(3)
+    parts = []
+    for low, high in np.array(slabs):
+        center = np.eye(4)
+        center[:3, 3] = (low + high) / 2
+        x, y, z = high - low
+        parts.append(Geometry(BoxShape((x, y, z)), place @ center))
+    return MeshShape(*merged(parts))
+
+
+def surface_points(mesh: MeshShape, number: int) -> np.ndarray:
+    """Random points of the triangles."""
+    random = np.random.default_rng(5)
+    chosen = mesh.vertices[mesh.faces[random.integers(len(mesh.faces), size=number)]]
+    return (chosen * random.dirichlet(np.ones(3), number)[:, :, None]).sum(1)
+
+
+@pytest.mark.parametrize("count", [1, 3, 8, 24, 1000])
+def test_pieces_hold_the_solid_together_and_stay_in_its_hull(count: int) -> None:
+    place = pose(1)
+    mesh = MeshShape(moved(place, l_shape().vertices), l_shape().faces)
+    solid = Solid(Link("l", (), ()), [Geometry(mesh)], Options())
+    pieces = Pieces(solid.vertices, solid.faces, solid.exact).at(count)
+    assert 1 <= len(pieces) <= count
+    hulls = [Geometry(MeshShape(*hull_triangles(points))) for points in pieces]
+    points = moved(place, points_of_l(4000))
+    assert (beyond(hulls, points) <= 1e-9).all()
+    assert max(beyond([Geometry(MeshShape(*hull_triangles(mesh.vertices)))], np.concatenate(pieces))) <= 1e-9
+    if count == 3:  # an L is two boxes
+        assert sum(volume(hull.shape) for hull in hulls) == pytest.approx(solid.volume, rel=0.2)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_shell_is_covered_by_hulls_that_are_proved_and_no_larger_than_its_own(closed: bool) -> None:
+    mesh = bowl()
+    if not closed:
+        mesh = MeshShape(mesh.vertices, mesh.faces[::2])  # every other triangle: no inside
+    found = Robot(arm_of(mesh)).bake(ellipsoids=40).covers["shell"]
+    assert found.proved and found.kind == "hull" and 5 <= len(found.geometries) <= 40
+    assert (beyond(found.geometries, surface_points(mesh, 3000)) <= 0).all()
+    around_it = Geometry(MeshShape(*hull_triangles(mesh.vertices)))
+    corners = np.concatenate([moved(one.pose, one.shape.vertices) for one in found.geometries])
+    assert beyond([around_it], corners).max() <= (1e-5 if closed else 5e-4)  # flat sides stay flat
+    if closed:
+        assert found.outside_ratio < 0.3
+
+
+def test_flat_pieces_get_a_volume() -> None:
+    flat = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0.1, 0.1, 0]])
+    for points in (flat, flat[:3], flat[:2], flat[:1]):
+        placed = moved(pose(2), points)
+        body = grown(hull_within(thickened(placed, 0.1), 32), 1e-7)
+        assert holds_points(body, placed, 1e-8) and volume(body.shape) < 1e-5
+
+
+def arm_of(mesh: MeshShape) -> Description:
+    """A robot of one link."""
+    return replace(arm(), links=(Link("shell", (Geometry(mesh),), ()),), joints=())
+
+
+def test_links_of_the_same_meshes_are_baked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    shell = arm_of(bowl()).links[0]
+    twins = replace(arm(), links=(shell, replace(shell, name="twin")), joints=())
+    made = []
+    monkeypatch.setattr("prolate.robots._baking._measured", lambda *them: made.append(them) or _measured(*them))
+    covers = Robot(twins).bake(ellipsoids=2).covers
+    assert len(made) == 1 and covers["shell"].name == "shell" and covers["twin"].name == "twin"

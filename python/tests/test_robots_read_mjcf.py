@@ -10,6 +10,7 @@ import prolate
 
 pytest.importorskip("lxml")
 mujoco = pytest.importorskip("mujoco")
+pytestmark = pytest.mark.usefixtures("own_folder")
 from prolate import robots  # noqa: E402
 
 ROBOT = """<mujoco model="thing">

@@ -10,6 +10,8 @@ pytest.importorskip("lxml")
 pytest.importorskip("scipy")
 from prolate import robots
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 INERTIAL = """<inertial><origin xyz="0.1 0.2 0.3" rpy="1 2 3"/><mass value="2"/>
 <inertia ixx="3" ixy="0.1" ixz="0.2" iyy="4" iyz="0.3" izz="5"/></inertial>"""
 SHAPES = """<collision><origin xyz="1 2 3" rpy="0.3 1.5707963267948966 0.1"/><geometry>

@@ -15,6 +15,7 @@ from prolate.robots._solids import hull_of, moved, polyhedron
 from prolate.robots._write_mjcf import write_mjcf
 
 mujoco = pytest.importorskip("mujoco")
+pytestmark = pytest.mark.usefixtures("own_folder")
 
 
 def compiled(robot, path: Path, **options):

@@ -25,6 +25,7 @@ class Job:
         self.links = [link for link in description.links if is_solid(link)]
         self.covers: dict[str, LinkCover] = {}
         self.notes: list[Note] = []
+        self._solids: dict[str, Solid] = {}
 
     def exact(self) -> BakedRobot:
         """Keep all geometries."""
@@ -53,11 +54,15 @@ class Job:
         key = key_of(self.links, (budget, [link.name for link in self.links], self.options))
         found = find(self.options.cache, key)
         if found is None:
-            begun = [self._begun(link) for link in self.links if self._meant(link)]
-            solids = [solid for solid in begun if solid is not None]
+            begun = {link.name: self._begun(link) for link in self.links if self._meant(link)}
+            solids = {name: solid for name, solid in begun.items() if solid is not None}
             spare = budget - sum(len(self._own(link)) for link in self.links)
-            covers = by_budget(solids, spare)
-            found = [_measured(solid, cover, solid.farthest(cover)) for solid, cover in zip(solids, covers)]
+            covers = by_budget(list(solids.values()), spare)
+            known: dict[tuple[Solid, Cover], LinkCover] = {}
+            for solid, cover in zip(solids.values(), covers):
+                if (solid, cover) not in known:
+                    known[solid, cover] = _measured(solid, cover, solid.farthest(cover))
+            found = [replace(known[one], name=name) for name, one in zip(solids, zip(solids.values(), covers))]
             if len(solids) == len(begun):
                 keep(self.options.cache, key, found)
         by_name = {cover.name: cover for cover in found}
@@ -81,11 +86,14 @@ class Job:
         return _measured(solid, *by_clearance(solid, limit))
 
     def _begun(self, link: Link) -> Solid | None:
-        """A solid that can be baked."""
+        """A solid that can be baked; links of the same geometries share one."""
         with self._noting(link):
-            solid = Solid(link, self._meant(link), self.options)
-            _ = solid.exact, solid.first
-            return solid
+            key = key_of([link], None)
+            if key not in self._solids:
+                solid = Solid(link, self._meant(link), self.options)
+                _ = solid.exact, solid.first
+                self._solids[key] = solid
+            return self._solids[key]
         return None
 
     def _add(self, cover: LinkCover, link: Link | None = None) -> None:

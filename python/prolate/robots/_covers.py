@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
 
 from .. import Asset, Ellipsoids, Tree, least_clearance
 from .._bake_many import bake_asset
-from ._fits import around, hull_within
+from ._fits import around, hull_within, thickened
 from ._measure import farthest
 from ._model import (
     BoxShape,
@@ -28,8 +29,9 @@ from ._model import (
     MeshShape,
     SphereShape,
 )
+from ._pieces import Pieces
 from ._proof import holds_ellipsoids, holds_points
-from ._solids import Faces, grown, hull_triangles, is_flat, merged, volume
+from ._solids import Faces, grown, hull_triangles, is_flat, merged, volume, volume_of_hull
 
 Kind = Literal["ellipsoids", "spheres", "sphere", "box", "capsule", "cylinder", "hull"]
 KEEPS: dict[type, set[Kind]] = {
@@ -41,7 +43,9 @@ KEEPS: dict[type, set[Kind]] = {
 }  #: a primitive of a link stays what it is if one of these kinds is allowed
 SINGLE: tuple[Kind, ...] = ("box", "capsule", "cylinder", "sphere")
 KINDS: tuple[Kind, ...] = ("hull", *SINGLE, "ellipsoids", "spheres")
+WORTH = 0.01  #: part of a cover's volume that is worth no more of a cost
 NEGLIGIBLE = 0.005  #: part of a cover's volume that is not worth a bake
+COUNTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  #: of convex pieces that are tried
 VERTICES_OF_ONE = 256  #: of a hull that costs as much as one ellipsoid
 
 
@@ -94,6 +98,7 @@ class Solid:
         self.link, self.geometries, self.options = link, geometries, options
         self.vertices, self.faces = merged(geometries)
         self._leaves: dict[str, Cover] = {}
+        self._hulls: dict[int, Cover] = {}
         self.rounding = float(np.linalg.norm(self.vertices - self.vertices.astype(np.float32), axis=1).max(initial=0.0))
         self.growth = self.rounding + 4e-7 * float(np.abs(self.vertices).max(initial=0.0))
 
@@ -142,15 +147,47 @@ class Solid:
         return [Cover("hull", bodies, sum(volume(hull.shape) for hull in bodies), proved)]
 
     @cached_property
+    def has_hulls(self) -> bool:
+        """Are hulls allowed, and possible?"""
+        return "hull" in self.options.kinds and len(self.points) > 0
+
+    @cached_property
+    def _pieces(self) -> Pieces | None:
+        """None where hulls are not allowed, or one is as good as the mesh."""
+        if not self.has_hulls:
+            return None
+        hull = volume_of_hull(self.points)
+        if hull - self.volume <= NEGLIGIBLE * hull:
+            return None
+        return Pieces(self.vertices, self.faces, self.exact, self.options.threads)
+
+    def hulls(self, most: float) -> Iterator[Cover]:
+        """By hulls of convex pieces, fewest first, that cost no more than ``most``, and are proved."""
+        for count in COUNTS:
+            if self._pieces is None or count > min(most, len(self._pieces.cells), self.options.max_ellipsoids):
+                return
+            if count not in self._hulls:
+                self._hulls[count] = self._around_pieces(self._pieces.at(count))
+            if self._hulls[count].proved and self._hulls[count].cost <= most:
+                yield self._hulls[count]
+
+    def _around_pieces(self, pieces: list[Matrix]) -> Cover:
+        most, size = self.options.max_hull_vertices, float(np.ptp(self.vertices, axis=0).max())
+        bodies = tuple(grown(hull_within(thickened(points, size), most), self.growth) for points in pieces)
+        # By half: to cut triangles rounds, too, by much less.
+        proved = all(holds_points(hull, points, self.growth / 2) for hull, points in zip(bodies, pieces))
+        return Cover("hull", bodies, sum(volume(hull.shape) for hull in bodies), proved)
+
+    @cached_property
     def convex(self) -> list[Cover]:
         """Those by one convex body, of the kinds asked for, or by a hull for each geometry."""
         kinds, most = self.options.kinds, self.options.max_hull_vertices
         if not len(self.points):
             return []
         found = []
-        if "hull" in kinds:
+        if self.has_hulls:
             found = [self._around("hull", hull_within(self.points, most)), *self._parts()]
-        if not found or len(self.points) > most:  # or else no other convex body can be smaller
+        if not found or found[0].volume > (1 + WORTH) * volume_of_hull(self.points):  # or else none can be much smaller
             found += [self._around(kind, around(self.points, kind)) for kind in kinds if kind in SINGLE]
         return found
 
@@ -208,15 +245,18 @@ def _bodies(inner: Ellipsoids, kind: Literal["ellipsoids", "spheres"]) -> Iterat
 def by_clearance(solid: Solid, clearance: float) -> tuple[Cover, float]:
     """A cover that sticks out by ``clearance`` (metres) at most, or as little as can be; and how far at most.
 
-    One convex body, if one does: that of least :func:`score`. Ellipsoids (or spheres) otherwise, as few as do, or as
-    many as there may be.
+    One convex body, if one does: that of least :func:`score`. Otherwise hulls of pieces, or else ellipsoids (or
+    spheres), as few as do, or as many as there may be.
     """
     convex = sorted((cover for cover in solid.convex if cover.proved), key=lambda cover: score(cover, solid))
-    for cover in convex:
+    several = solid.hulls(solid.options.max_ellipsoids)
+    tried = []
+    for cover in chain(convex, several):
         bound = solid.farthest(cover, clearance)
         if bound <= clearance:
             return cover, min(bound, solid.farthest(cover))  # either may be the finer one
-    found = [(cover, solid.farthest(cover)) for cover in convex]
+        tried.append(cover)
+    found = [(cover, solid.farthest(cover)) for cover in (*convex, *tried[len(convex) :][-1:])]
     if solid.baked_kind is not None or not convex:
         least = least_clearance(solid.exact.info.diagonal, solid.options.quality)
         cover = solid.leaves(clearance=max(clearance - solid.growth, least), ellipsoids=solid.options.max_ellipsoids)
@@ -226,7 +266,7 @@ def by_clearance(solid: Solid, clearance: float) -> tuple[Cover, float]:
 
 def score(cover: Cover, solid: Solid) -> float:
     """What is better is less. A hundredth of the cover's own volume is added, as none is worth any price."""
-    return (max(cover.volume - solid.volume, 0.0) + 0.01 * cover.volume) * cover.cost
+    return (max(cover.volume - solid.volume, 0.0) + WORTH * cover.volume) * cover.cost
 
 
 def by_budget(solids: Sequence[Solid], budget: float) -> list[Cover]:
@@ -263,13 +303,21 @@ def _gain(now: Cover, then: Cover) -> float:
 def _step(solid: Solid, now: Cover, spare: float) -> Cover | None:
     """The best of the next few that can be afforded; None if nothing gains.
 
-    The outside volume of n ellipsoids falls about like n^-0.8. So one bake tells how many are worth trying next.
+    Hulls of pieces are flat where the solid is, and found in less time than ellipsoids; these are for when hulls are
+    not allowed. The outside volume of n ellipsoids falls about like n^-0.8. So one bake tells how many to try next.
     """
-    options = [cover for cover in solid.convex if cover.proved]
-    most = min(int(spare + now.cost), solid.options.max_ellipsoids) if solid.baked_kind else 0
-    outside = max(now.volume - solid.volume, 0.0)
+    options = [cover for cover in solid.convex if cover.proved and cover.cost - now.cost <= spare]
+    outside = max(min(one.volume for one in (now, *options)) - solid.volume, 0.0)
+    if outside <= NEGLIGIBLE * now.volume:
+        most = 0
+    elif solid.has_hulls:
+        pieces = solid.hulls(spare + now.cost)
+        options += [one for one in pieces if one.cost > now.cost and _gain(now, one) > WORTH * now.volume]
+        most = 0
+    else:
+        most = min(int(spare + now.cost), solid.options.max_ellipsoids) if solid.baked_kind else 0
     count = 8 if now.cost < 8 else 2 * int(now.cost)
-    while count <= most and outside > NEGLIGIBLE * now.volume:
+    while count <= most:
         found = solid.leaves(ellipsoids=count)
         options.append(found)
         enough = count * ((found.volume - solid.volume) / outside) ** 1.25

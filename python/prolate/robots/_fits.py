@@ -39,6 +39,20 @@ def hull_within(points: Matrix, most: int) -> Geometry:
     return Geometry(MeshShape(vertices, faces))
 
 
+def thickened(points: Matrix, size: float) -> Matrix:
+    """The points (n, 3), or where these are flat, or nearly, points on both sides of them: a hull needs a volume.
+
+    ``size``, metres, is that of all that they are a part of.
+    """
+    apart = points - points.mean(0)
+    axes = np.linalg.eigh(apart.T @ apart)[1].T
+    extents = np.ptp(apart @ axes.T, axis=0)
+    by = 5e-4 * max(extents.max(), 0.02 * size)
+    for axis in axes[extents < by]:
+        points = np.concatenate([points + by * axis, points - by * axis])
+    return points
+
+
 def _outer_hull(hull: ConvexHull, most: int) -> tuple[Matrix, NDArray[np.int64]]:
     planes = hull.equations.copy()
     corners = hull.points[hull.vertices]

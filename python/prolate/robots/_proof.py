@@ -11,9 +11,9 @@ from ._model import EllipsoidShape, Geometry, Matrix, SphereShape
 from ._solids import inverse, moved, outside
 
 
-def holds_points(geometry: Geometry, points: Matrix) -> bool:
-    """Does one convex geometry hold the points (n, 3), and with them their convex hull?"""
-    return bool((outside(geometry.shape, moved(inverse(geometry.pose), points)) <= 0).all())
+def holds_points(geometry: Geometry, points: Matrix, by: float = 0.0) -> bool:
+    """Does a convex geometry hold all within ``by`` (metres) of the points (n, 3), and with them of their hull?"""
+    return bool((outside(geometry.shape, moved(inverse(geometry.pose), points)) <= -by).all())
 
 
 def holds_ellipsoids(geometries: Sequence[Geometry], ellipsoids: Ellipsoids, by: float) -> bool:

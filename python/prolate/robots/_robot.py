@@ -43,9 +43,9 @@ class Robot:
     ) -> BakedRobot:
         """Cover each link; what covers it is proved to.
 
-        Primitives of allowed kinds stay what they are. All else of a link gets one cover: one convex body (or a
-        hull for each mesh), or several ellipsoids (or spheres). The goal is one of ``clearance``, ``ellipsoids`` and
-        ``exact``; by default a clearance of 5 mm.
+        Primitives of allowed kinds stay what they are. All else of a link gets one cover: one convex body, hulls of
+        its meshes or of convex pieces, or several ellipsoids (or spheres). The goal is one of ``clearance``,
+        ``ellipsoids`` and ``exact``; by default a clearance of 5 mm.
 
         What a cover costs is counted in ellipsoids: each body is one, and a convex hull one for each 256 vertices, but
         at least one.
@@ -54,9 +54,10 @@ class Robot:
         ----------
         clearance : float or str, optional
             How far a cover may stick out of its meshes: metres, or a text such as ``"5mm"``. A link gets the convex
-            body of least outside volume times cost that sticks out by no more, or ellipsoids if none does.
+            body of least outside volume times cost that sticks out by no more, or hulls of pieces, or ellipsoids.
         ellipsoids : int, optional
-            What all covers may cost together, spread over the links where the next step gains most outside volume.
+            What all covers may cost together, spread over the links where the next step gains most outside volume. A
+            further hull must gain 1 % of a link's.
         exact : bool
             Keep the meshes; trees are then exact, as planners want them.
         only : kind or tuple of kinds, optional
@@ -66,7 +67,8 @@ class Robot:
         max_hull_vertices : int
             Of a convex hull, 8 or more. A hull of more is simplified from outside.
         max_ellipsoids : int
-            Of a link, where the goal is a clearance. A link that would need more gets a warning in ``notes``.
+            Most ellipsoids, or hulls of pieces (64 at most), of a link. One that would need more for a clearance gets
+            a warning in ``notes``.
         quality : {"fast", "normal", "best"}
             Of bakes; see :func:`prolate.bake`.
         cache : path-like, optional

@@ -60,7 +60,7 @@ def volume(shape: Shape) -> float:
     if isinstance(shape, EllipsoidShape):
         return 4 / 3 * np.pi * float(np.prod(shape.radii))
     if isinstance(shape, MeshShape):
-        return float(hull_of(shape.vertices).volume)
+        return volume_of_hull(shape.vertices)
     raise TypeError(f"{type(shape).__name__} has no volume")
 
 
@@ -142,6 +142,11 @@ def _hull(points: bytes) -> ConvexHull:
         return ConvexHull(np.frombuffer(points).reshape(-1, 3))
     except QhullError:
         raise ValueError("the points are flat: they have no hull with a volume") from None
+
+
+def volume_of_hull(points: Matrix) -> float:
+    """m^3; raises ValueError where the points are flat."""
+    return float(hull_of(points).volume)
 
 
 def hull_triangles(points: Matrix) -> Triangles:
