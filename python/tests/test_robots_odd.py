@@ -151,6 +151,15 @@ def test_numbers_out_of_range(odd: Path, wrong: str, capsys: pytest.CaptureFixtu
     assert "must be" in capsys.readouterr().err
 
 
+def test_a_body_called_as_a_link_is_not_allowed_with_it(odd: Path) -> None:
+    description = robots.load(odd)
+    trees = {name: cover.tree for name, cover in robots.Robot(description).bake(exact=True).covers.items()}
+    checks = robots.Checks(description, trees, allowed=[("base", "s::t"), ("base", "floor")])
+    box = prolate.Box([0, 0, 0, 0, 0, 0, 1], [0.1, 0.1, 0.1])
+    assert checks.collide(checks.kinematics.home, robots.Scene().add(box, name="s::t"))[0]
+    assert not checks.collide(checks.kinematics.home, robots.Scene().add(box, name="floor"))[0]
+
+
 def test_slack_of_no_link_and_poses_that_scale_are_refused(odd: Path) -> None:
     description = robots.load(odd)
     with pytest.raises(ValueError, match="slack: the robot has no link bse"):

@@ -60,7 +60,8 @@ class Checks:
     slack : mapping of str to float, optional
         By how much what a tree stands for may stick out of it, metres.
     allowed : iterable of (str, str), optional
-        Pairs of links, or of a link and a body of the scene by its name, that may touch.
+        Pairs of links, or of a link and a body of the scene by its name, that may touch. A name that a link and a body
+        share is the link's.
 
     Notes
     -----
@@ -236,7 +237,7 @@ class Checks:
                 (index[link], body)
                 for link in index
                 for body, name in enumerate(scene.names)
-                if frozenset((link, name)) in self._allowed
+                if name not in index and frozenset((link, name)) in self._allowed
             ]
             native = _core.RobotChecks(self._robot, scene.native, np.array(free, np.int64).reshape(-1, 2))
             last = self._last = (scene, len(scene), native)
