@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -197,3 +198,19 @@ def test_a_link_that_misses_a_part_is_not_proved(tmp_path: Path) -> None:
     path.write_text(f'<robot><link name="a">{BOX}{mesh}</link></robot>')
     for baked in (robots.Robot.load(path).bake(), robots.Robot.load(path).bake(exact=True)):
         assert list(baked.covers) == ["a"] and not baked.proved
+
+
+@pytest.mark.parametrize("kind", ["box", "cylinder", "capsule", "sphere", "hull", "ellipsoids"])
+def test_what_is_as_thin_as_rounding_has_covers(tmp_path: Path, kind: Any) -> None:
+    for size in ("1 1 1e-12", "1e-9 1 1e-9"):
+        path = tmp_path / "thin.urdf"
+        path.write_text(f'<robot><link name="a">{BOX.replace("0.1 0.1 0.3", size)}</link></robot>')
+        baked = robots.Robot.load(path).bake(only=kind)
+        assert baked.proved and baked.covers["a"].kind in (kind, "own", "ellipsoids")
+
+
+def test_a_link_of_no_size_that_can_be_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "far.urdf"
+    path.write_text("<robot>" + LINK.format('<sphere radius="1e30"/>') + "</robot>")
+    with pytest.raises(prolate.Error, match="link a: "):
+        robots.Robot.load(path).bake().collide([])

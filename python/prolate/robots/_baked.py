@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from .. import Tree, bake
+from .. import Error, Tree, bake
 from ._checks import Checks, RobotDistances
 from ._covers import cost_of
 from ._model import Description, Geometry, Link, Note, PlaneShape
@@ -71,7 +71,10 @@ class LinkCover:
     def tree(self) -> Tree:
         """The cover for this library's queries, in the link's frame: of ellipsoids the tree whose leaves they hold, of
         all else an exact tree of the polyhedra around the geometries."""
-        return self.baked or bake(*merged(self.geometries), exact=True)
+        try:
+            return self.baked or bake(*merged(self.geometries), exact=True)
+        except (Error, ValueError) as error:
+            raise Error(f"link {self.name}: {error}", "bad_mesh") from None
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._model import BoxShape, CapsuleShape, CylinderShape, Geometry, Matrix, MeshShape, SphereShape
+from ._model import BoxShape, CapsuleShape, CylinderShape, Geometry, Matrix, MeshShape, Shape, SphereShape
 from ._solids import grown, hull_of, hull_triangles, inverse, moved, outside
 
 if TYPE_CHECKING:
@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 def around(points: Matrix, kind: str) -> Geometry:
     """A small body of a kind (``"sphere"``, ``"box"``, ``"capsule"`` or ``"cylinder"``) that holds the points (n, 3),
     which are not flat."""
-    found = _FITS[kind](hull_triangles(points)[0])
+    corners = hull_triangles(points)[0]
+    try:
+        found = _FITS[kind](corners)
+    except ValueError:  # of trimesh, for what is as thin as rounding
+        found = _along_axes(corners, kind)
     return _holding(found, points)
 
 
@@ -90,6 +94,24 @@ def _holding(geometry: Geometry, points: Matrix) -> Geometry:
     """Grown until all points are in it."""
     beyond = float(outside(geometry.shape, moved(inverse(geometry.pose), points)).max())
     return grown(geometry, max(beyond, 0.0) * (1 + 1e-9) + 1e-12) if beyond > -1e-12 else geometry
+
+
+def _along_axes(points: Matrix, kind: str) -> Geometry:
+    """A body about the points' principal axes, z along the longest; not the smallest that there is."""
+    apart, pose = points - points.mean(0), np.eye(4)
+    pose[:3, :3] = np.linalg.eigh(apart.T @ apart)[1]
+    pose[:3, 0] *= np.linalg.det(pose[:3, :3])  # right-handed
+    local = moved(inverse(pose), points)
+    low, high = local.min(0), local.max(0)
+    x, y, z = (float(edge) for edge in np.maximum(high - low, 1e-12))
+    pose[:3, 3] = pose[:3, :3] @ ((low + high) / 2)
+    across = float(np.hypot(x, y)) / 2
+    bodies: dict[str, Shape] = {
+        "box": BoxShape((x, y, z)),
+        "cylinder": CylinderShape(across, z),
+        "capsule": CapsuleShape(across, z),
+    }
+    return Geometry(bodies.get(kind) or SphereShape(float(np.hypot(across, z / 2))), pose)
 
 
 def _box(points: Matrix) -> Geometry:
