@@ -68,7 +68,8 @@ PROLATE_ROBOT_INLINE void take(uint32_t pair, const Floats& gap, const Floats& m
                                std::array<std::vector<Candidate>, kLanes>& candidates) {
     for (uint32_t left = bits(!(gap > margin)); left != 0; left &= left - 1) {
         const auto lane = static_cast<size_t>(__builtin_ctz(left));
-        candidates[lane].push_back({pair, gap[lane]});
+        const float known = gap[lane] == gap[lane] ? gap[lane] : -kInfinity; // beyond the range of floats: asked first
+        candidates[lane].push_back({pair, known});
     }
 }
 
