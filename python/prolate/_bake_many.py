@@ -193,7 +193,7 @@ def _found_or_baked(mesh: Any, options: dict[str, Any], folder: str | None, file
         return bake_mesh(mesh, **options), False
     source, key = _core.bake_key(*prepared(mesh, options))
     if file_key is not None:
-        _write(os.path.join(folder, f"{file_key:016x}.mesh"), f"{file_key:016x} {source:016x}\n".encode())
+        write_atomically(os.path.join(folder, f"{file_key:016x}.mesh"), f"{file_key:016x} {source:016x}\n".encode())
     tree = _find(folder, source, key)
     if tree is not None:
         return tree, True
@@ -237,7 +237,7 @@ def _find(folder: str, source: int | None, options: int) -> Tree | None:
     return tree if sound else None
 
 
-def _write(path: str, content: bytes) -> None:
+def write_atomically(path: str, content: bytes) -> None:
     """Atomically: workers on other machines read it meanwhile."""
     import secrets
 

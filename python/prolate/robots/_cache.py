@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import Error, Tree, __version__, _core
 from .._bake import core_options
-from .._bake_many import _write as write_atomically
+from .._bake_many import write_atomically
 from ._baked import LinkCover
 from ._model import BoxShape, CapsuleShape, CylinderShape, EllipsoidShape, Geometry, Link, MeshShape, Shape, SphereShape
 

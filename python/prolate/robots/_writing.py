@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .._bake_many import _write as write_atomically
+from .._bake_many import write_atomically
 from .._errors import Error, path_of
 from ._model import Description, Matrix, MeshShape
 
