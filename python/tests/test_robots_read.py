@@ -164,20 +164,20 @@ def test_vertices_without_a_triangle_do_not_count(write):
 
 
 def test_packages_are_found(write, tmp_path, monkeypatch):
-    mesh = one_link(collision('<mesh filename="package://parts/meshes/part.obj"/>'))
-    path = write(mesh, "parts/urdf/robot.urdf")
+    mesh = one_link(collision('<mesh filename="package://my_parts/meshes/part.obj"/>'))
+    path = write(mesh, "my_parts/urdf/robot.urdf")
     (error,) = texts(robots.load(path), "error")
-    assert "robot.urdf:3: link a: " in error and "put it there" in error
-    write(TETRAHEDRON, "parts/meshes/part.obj")
+    assert "robot.urdf:3: link a: " in error and "put it there, or say where" in error
+    write(TETRAHEDRON, "my_parts/meshes/part.obj")
     assert not robots.load(path).notes  # a folder above the description
     elsewhere = write(mesh, "other/robot.urdf")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "none"))
-    (tmp_path / "parts").rename(tmp_path / "moved")
+    (tmp_path / "my_parts").rename(tmp_path / "moved")
     (error,) = texts(robots.load(elsewhere), "error")
-    assert "there is no package parts" in error and "--package parts=FOLDER" in error
-    assert not robots.load(elsewhere, packages={"parts": tmp_path / "moved"}).notes
+    assert "there is no package my_parts" in error and "--package my_parts=FOLDER" in error
+    assert not robots.load(elsewhere, packages={"my_parts": tmp_path / "moved"}).notes
     (tmp_path / "none").mkdir()
-    (tmp_path / "moved").rename(tmp_path / "none" / "parts")
+    (tmp_path / "moved").rename(tmp_path / "none" / "my_parts")
     assert not robots.load(elsewhere).notes
 
 

@@ -65,24 +65,24 @@ class Packages:
         if colon and scheme in ("package", "model"):
             package, _, inside = rest.partition("/")
             folders = self.candidates(package)
+            say_where = f"say where the package is with --package {package}=FOLDER (in Python packages=)"
             if not any(map(os.path.isdir, folders)):
                 raise MeshError(
                     f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
-                    f"{self.description.resolve().parent}; say where with --package {package}=FOLDER (in Python "
-                    "packages=)"
+                    f"{self.description.resolve().parent}; {say_where}"
                 )
-            return self._existing(name, [folder / inside for folder in folders])
+            return self._existing(name, [folder / inside for folder in folders], say_where)
         if colon:
             raise MeshError(f"{name}: only package://, model:// and file:// are followed; give a path")
         return self._existing(name, [self.description.parent / name])
 
     @staticmethod
-    def _existing(name: str, paths: list[Path]) -> Path:
+    def _existing(name: str, paths: list[Path], way_out: str = "correct the name") -> Path:
         for path in paths:
             if os.path.isfile(path):  # also false of a name that no system takes
                 return path
         there = next((path for path in paths if os.path.isdir(path.parent)), paths[0])
-        raise MeshError(f"{name}: there is no file {there}; put it there, or correct the name")
+        raise MeshError(f"{name}: there is no file {there}; put it there, or {way_out}")
 
 
 @dataclass
