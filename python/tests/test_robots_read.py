@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import sys
 
 import numpy as np
 import pytest
@@ -164,20 +165,20 @@ def test_vertices_without_a_triangle_do_not_count(write):
 
 
 def test_packages_are_found(write, tmp_path, monkeypatch):
-    mesh = one_link(collision('<mesh filename="package://my_parts/meshes/part.obj"/>'))
-    path = write(mesh, "my_parts/urdf/robot.urdf")
+    mesh = one_link(collision('<mesh filename="package://parts/meshes/part.obj"/>'))
+    path = write(mesh, "parts/urdf/robot.urdf")
     (error,) = texts(robots.load(path), "error")
-    assert "robot.urdf:3: link a: " in error and "put it there, or say where" in error
-    write(TETRAHEDRON, "my_parts/meshes/part.obj")
+    assert "robot.urdf:3: link a: " in error and "put it there" in error
+    write(TETRAHEDRON, "parts/meshes/part.obj")
     assert not robots.load(path).notes  # a folder above the description
     elsewhere = write(mesh, "other/robot.urdf")
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "none"))
-    (tmp_path / "my_parts").rename(tmp_path / "moved")
+    (tmp_path / "parts").rename(tmp_path / "moved")
     (error,) = texts(robots.load(elsewhere), "error")
-    assert "there is no package my_parts" in error and "--package my_parts=FOLDER" in error
-    assert not robots.load(elsewhere, packages={"my_parts": tmp_path / "moved"}).notes
+    assert "there is no package parts" in error and "--package parts=FOLDER" in error
+    assert not robots.load(elsewhere, packages={"parts": tmp_path / "moved"}).notes
     (tmp_path / "none").mkdir()
-    (tmp_path / "moved").rename(tmp_path / "none" / "my_parts")
+    (tmp_path / "moved").rename(tmp_path / "none" / "parts")
     assert not robots.load(elsewhere).notes
 
 
@@ -358,5 +359,19 @@ def test_xacro(write):
     assert robot.links[0].collisions[0].shape == robots.BoxShape((1, 2, 3)) and robot.nq == 3
     with pytest.raises(prolate.Error, match="xacro: "):
         robots.load(write(text.replace("${1}", "${one}"), "broken.xacro"))
-    with pytest.raises(prolate.Error, match="expand it where ROS is installed"):
-        robots.load(write(text.replace("${1}", "$(find one)"), "find.xacro"))
+
+
+def test_xacro_finds_packages(write, tmp_path):
+    pytest.importorskip("xacro")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "sizes.xacro").write_text(
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="one" value="1"/></robot>'
+    )
+    text = ARM.replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    text = text.replace("<link", '<xacro:include filename="$(find sizes)/sizes.xacro"/><link', 1)
+    path = write(text.replace('<box size="1 2 3"/>', '<box size="${one} 2 3"/>'), "find.xacro")
+    robot = robots.load(path, packages={"sizes": tmp_path / "elsewhere"})
+    assert robot.links[0].collisions[0].shape == robots.BoxShape((1, 2, 3))
+    with pytest.raises(prolate.Error, match=r"find sizes\): there is no package sizes .* --package sizes=FOLDER"):
+        robots.load(path)
+    assert "ament_index_python" not in sys.modules

@@ -156,10 +156,84 @@ def test_broken_frames_and_joints_are_named(write, old, new, said):
 
 
 def test_what_is_left_out_is_named(write):
-    text = RELATIVE.replace("</model>", "<include><uri>model://wheel</uri></include><plugin/></model><model name='s'/>")
+    text = RELATIVE.replace(
+        "</model>", "<include><uri>https://fuel/wheel</uri></include><plugin/></model><model name='s'/>"
+    )
     robot = robots.load(write(text))
-    assert "includes model://wheel, which is not followed" in texts(robot, "error")[0]
+    assert "https://fuel/wheel: only package://, model:// and file://" in texts(robot, "error")[0]
     assert "model s: only the first model" in texts(robot, "warning")[0]
     assert "<plugin> in <model> is not understood" in texts(robot, "info")[0]
     with pytest.raises(prolate.Error, match="has no <model>"):
         robots.load(write('<sdf version="1.7"/>'))
+
+
+WHEEL = """<sdf version="1.4"><model name="wheel"><pose>9 9 9 0 0 0</pose><link name="rim">
+<pose>0 0 0 0 0 1</pose>
+<collision name="c"><geometry><mesh><uri>tyre.obj</uri></mesh></geometry></collision></link><link name="cap"/>
+<joint name="spin" type="revolute"><parent>rim</parent><child>cap</child><axis><xyz>0 1 0</xyz></axis></joint>
+</model></sdf>"""
+
+
+@pytest.fixture
+def wheel(tmp_path):
+    folder = tmp_path / "models" / "wheel"
+    folder.mkdir(parents=True)
+    (folder / "wheel.sdf").write_text(WHEEL)
+    (folder / "tyre.obj").write_text(TETRAHEDRON)
+    (folder / "model.config").write_text('<model><sdf version="1.4">wheel.sdf</sdf><sdf version="1.3">x</sdf></model>')
+    return folder
+
+
+def test_includes_are_nested_models(write, wheel):
+    text = RELATIVE.replace(
+        "</model>",
+        '<include><uri>model://wheel</uri><name>left</name><pose relative_to="a">1 2 3 0 0 0.5</pose></include>'
+        "<include><uri>models/wheel/wheel.sdf</uri></include>"
+        '<joint name="weld" type="fixed"><parent>a</parent><child>left::rim</child></joint>'
+        '<joint name="other" type="fixed"><parent>b</parent><child>wheel::rim</child></joint></model>',
+    )
+    robot = robots.load(write(text), packages={"wheel": wheel})
+    assert not robot.notes and {one.name for one in robot.links} == {
+        "base", "a", "left::rim", "left::cap", "b", "wheel::rim", "wheel::cap",
+    }  # fmt: skip
+    home = frames(robot, [0] * robot.nq)
+    turn = lambda angle: np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])  # noqa: E731
+    there = np.linalg.inv(home["a"]) @ home["left::rim"]
+    np.testing.assert_allclose(there[:3, 3], [1, 2, 3], atol=1e-12)
+    np.testing.assert_allclose(there[:2, :2], turn(1.5), atol=1e-12)
+    np.testing.assert_allclose(home["wheel::rim"][:3, 3], [9, 9, 9], atol=1e-12)  # as the wheel itself says
+    # An axis is along the model's in SDF 1.4, whatever the version of the file that includes it.
+    spin = next(joint for joint in robot.joints if joint.name == "left::spin")
+    np.testing.assert_allclose(home["left::cap"][:3, :3] @ spin.axis, home["a"][:3, :3] @ [*(turn(0.5) @ [0, 1]), 0])
+    assert np.isclose(volume(link(robot, "left::rim").collisions[0].shape), 1)
+
+
+def test_a_world_that_only_includes(write, wheel):
+    text = '<sdf version="1.6"><world name="w"><include><uri>model://wheel</uri></include></world></sdf>'
+    robot = robots.load(write(text), packages={"wheel": wheel})
+    assert [one.name for one in robot.links] == ["rim", "cap"] and not robot.notes
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ('<include merge="true"><uri>model://wheel</uri></include>', "merge= is not understood"),
+        ("<include><uri>model://tyre</uri></include>", "there is no package tyre"),
+        ("<include><uri>models/wheel/none.sdf</uri></include>", "there is no file"),
+        ("<include><uri>models/wheel/tyre.obj</uri></include>", "is not XML"),
+        ("<include><uri>robot.sdf</uri></include>", "includes itself"),
+        ("<include/>", "there is no file"),
+    ],
+)
+def test_includes_that_cannot_be_followed_are_named(write, wheel, wrong, said):
+    robot = robots.load(write(RELATIVE.replace("</model>", f"\n{wrong}</model>")), packages={"wheel": wheel})
+    (error,) = texts(robot, "error")
+    assert said in error and "robot.sdf:12: <include>" in error and len(robot.links) == 3
+
+
+def test_what_is_wrong_with_an_included_model_names_its_file(write, wheel):
+    (wheel / "tyre.obj").unlink()
+    robot = robots.load(
+        write(RELATIVE.replace("</model>", "<include><uri>models/wheel</uri></include></model>")),
+    )
+    assert any("wheel.sdf:3: link wheel::rim: " in error and "tyre.obj" in error for error in texts(robot, "error"))

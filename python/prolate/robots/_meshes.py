@@ -13,7 +13,7 @@ import numpy as np
 from .._errors import Error
 from .._mesh import load_mesh
 from ._model import Matrix, MeshShape
-from ._xml import parse
+from ._xml import parse, version_of
 
 Folders = Union[str, "os.PathLike[str]", Iterable[Union[str, "os.PathLike[str]"]]]
 
@@ -64,25 +64,50 @@ class Packages:
             return self._existing(name, [Path(rest)])
         if colon and scheme in ("package", "model"):
             package, _, inside = rest.partition("/")
-            folders = self.candidates(package)
-            say_where = f"say where the package is with --package {package}=FOLDER (in Python packages=)"
-            if not any(map(os.path.isdir, folders)):
-                raise MeshError(
-                    f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
-                    f"{self.description.resolve().parent}; {say_where}"
-                )
-            return self._existing(name, [folder / inside for folder in folders], say_where)
+            self.folder(package, name)
+            return self._existing(name, [folder / inside for folder in self.candidates(package)])
         if colon:
             raise MeshError(f"{name}: only package://, model:// and file:// are followed; give a path")
         return self._existing(name, [self.description.parent / name])
 
+    def folder(self, package: str, name: str) -> Path:
+        """The likeliest of the package's folders; ``name`` is what asks for it."""
+        for folder in self.candidates(package):
+            if os.path.isdir(folder):  # also false of a name that no system takes
+                return folder
+        raise MeshError(
+            f"{name}: there is no package {package} in ROS_PACKAGE_PATH, AMENT_PREFIX_PATH or above "
+            f"{self.description.resolve().parent}; say where with --package {package}=FOLDER (in Python packages=)"
+        )
+
+    def model(self, name: str, beside: Path) -> Path:
+        """The SDF that an ``<include>`` in a file of the folder ``beside`` calls ``name``: a file, or a folder of one
+        that its model.config names, or that is called model.sdf."""
+        scheme, colon, rest = name.partition("://")
+        if colon and scheme in ("package", "model"):
+            package, _, inside = rest.partition("/")
+            path = self.folder(package, name) / inside
+        elif colon and scheme != "file":
+            raise MeshError(f"{name}: only package://, model:// and file:// are followed; get it, and give a path")
+        else:
+            path = beside / (rest if colon else name)
+        return self._existing(name, [path / _sdf_in(path) if path.is_dir() else path])
+
     @staticmethod
-    def _existing(name: str, paths: list[Path], way_out: str = "correct the name") -> Path:
+    def _existing(name: str, paths: list[Path]) -> Path:
         for path in paths:
             if os.path.isfile(path):  # also false of a name that no system takes
                 return path
         there = next((path for path in paths if os.path.isdir(path.parent)), paths[0])
-        raise MeshError(f"{name}: there is no file {there}; put it there, or {way_out}")
+        raise MeshError(f"{name}: there is no file {there}; put it there, or correct the name")
+
+
+def _sdf_in(folder: Path) -> str:
+    """The file of the newest version that a model's folder has."""
+    config = folder / "model.config"
+    files = parse(config).findall("sdf") if config.is_file() else []
+    newest = max(files, key=lambda one: version_of(one.get("version")), default=None)
+    return "model.sdf" if newest is None else (newest.text or "").strip()
 
 
 @dataclass

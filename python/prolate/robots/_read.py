@@ -15,7 +15,8 @@ from ._mjcf import read_mjcf
 from ._model import Description, Format, Where
 from ._sdf import SdfReader
 from ._srdf import read_srdf
-from ._urdf import UrdfReader, expand_xacro
+from ._urdf import UrdfReader
+from ._xacro import expand_xacro
 from ._xml import BadElement, Notes, name_of, parse
 
 if TYPE_CHECKING:
@@ -41,8 +42,9 @@ def load(
     path : path-like
         What is in the file decides, not its name; but a xacro file is known by its ending ``.xacro``.
     packages : mapping of str to path-like, or to several, optional
-        Folders of packages, for ``package://name/...``. Without it ROS_PACKAGE_PATH, AMENT_PREFIX_PATH and Gazebo's
-        paths are searched, and the folders above the file for one of that name.
+        Folders of packages, for ``package://name/...``, ``model://name/...`` and xacro's ``$(find name)``. Then
+        ROS_PACKAGE_PATH, AMENT_PREFIX_PATH and Gazebo's paths are searched, and the folders above the file for one of
+        that name.
     srdf : path-like, optional
         Names pairs of links that are never in contact.
     xacro_args : mapping of str to str, optional
@@ -72,10 +74,11 @@ def load(
     _check("dae_unit", dae_unit, ("obey", "ignore"))
     _check("gltf_axes", gltf_axes, ("keep", "turn"))
     notes = Notes()
-    meshes = Meshes(Packages.of(source, packages), dae_unit, gltf_axes)
+    folders = Packages.of(source, packages)
+    meshes = Meshes(folders, dae_unit, gltf_axes)
     text = None
     if source.suffix == ".xacro":
-        text = expand_xacro(source, xacro_args or {})
+        text = expand_xacro(source, xacro_args or {}, folders)
         notes.add("info", "lines are those of the URDF that xacro makes of it", Where(source))
     root = parse(source, text)
     description = assemble(*_parts(root, source, meshes, notes, visuals), notes)

@@ -53,21 +53,23 @@ class SdfReader(SdfFrames):
     """Reads one file. What is wrong with an element becomes a note, and the rest is read."""
 
     def __init__(self, path: Path, meshes: Meshes, notes: Notes, visuals: bool) -> None:
-        super().__init__(path, notes)
+        super().__init__(path, meshes.packages, notes)
         self.meshes, self.visuals = meshes, visuals
-        self.old_axes = False
         self.adjacent: list[tuple[str, str]] = []  # links that a joint of two axes connects
 
     def robot(self, root: Element) -> Parts:
-        version = tuple(int(part) for part in (root.get("version") or "1.6").split(".")[:2] if part.isdigit())
-        self.old_axes = version < (1, 5)
-        models = root.findall("model") + [model for world in root.findall("world") for model in world.findall("model")]
+        models = self._models(root)
+        if not models:
+            for world in root.findall("world"):
+                self.follow(world)
+            models = self._models(root)
         if not models:
             raise self.fail(root, "has no <model>")
         for other in models[1:]:
             text = f"model {other.get('name')}: only the first model of a file is read, {models[0].get('name')}"
             self.notes.add("warning", text, self.where(other))
         model, name = models[0], models[0].get("name") or self.path.stem
+        self.follow(model)
         self._name_contents(model)
         self.declare(model)
         links = list(self._links(model, ""))
@@ -76,11 +78,12 @@ class SdfReader(SdfFrames):
             links = [Link("world", where=self.where(model)), *links]
         return Parts(name, links, joints, dict.fromkeys(self.adjacent, "adjacent"))
 
+    @staticmethod
+    def _models(root: Element) -> list[Element]:
+        return [*root.findall("model"), *(model for world in root.findall("world") for model in world.findall("model"))]
+
     def _name_contents(self, model: Element) -> None:
         self.name_others(model, {*_MODEL, "include"}, self.notes)
-        for element in model.findall("include"):
-            text = f"includes {self.child(element, 'uri')}, which is not followed; `gz sdf -p` writes it out"
-            self.notes.add("error", text, self.where(element))
         for nested in model.findall("model"):
             self._name_contents(nested)
 
@@ -159,12 +162,17 @@ class SdfReader(SdfFrames):
             raise self.fail(element, "a <submesh> of a file is not understood; put it into a file of its own")
         x, y, z = self.numbers(element, "scale", 3, (1, 1, 1))
         try:
-            shape, said = self.meshes.shape(self.child(element, "uri") or "", (x, y, z))
+            shape, said = self.meshes.shape(self._uri(element), (x, y, z))
         except MeshError as error:
             raise self.fail(element, str(error)) from None
         for text in said:
             self.notes.once(text, self.where(element), link)
         return shape
+
+    def _uri(self, element: Element) -> str:
+        """Of a file; what is relative is so to the file that names it."""
+        uri, file = self.child(element, "uri"), self.file_of(element)
+        return uri if "://" in uri or file == self.path else f"file://{file.absolute().parent / uri}"
 
     def _inertial(self, link: Element, name: str, scope: str) -> Inertial | None:
         element = link.find("inertial")
@@ -276,7 +284,7 @@ class SdfReader(SdfFrames):
             raise self.fail(axis, "has no direction")
         xyz = axis.find("xyz")
         frame = (None if xyz is None else xyz.get("expressed_in")) or joint.get("name")
-        if self.old_axes or self.child(axis, "use_parent_model_frame") in ("1", "true"):
+        if self.version_of(joint) < (1, 5) or self.child(axis, "use_parent_model_frame") in ("1", "true"):
             frame = "__model__"
         x, y, z = self.between(child, scope + frame, axis)[:3, :3] @ vector / length
         return float(x), float(y), float(z)

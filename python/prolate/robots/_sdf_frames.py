@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._meshes import Packages
 from ._model import Matrix
-from ._xml import TURN, BadElement, Notes, Reader, name_of, pose_matrix, quaternion_matrix, rpy_matrix
+from ._sdf_include import SdfIncludes
+from ._xml import TURN, BadElement, Notes, name_of, pose_matrix, quaternion_matrix, rpy_matrix
 
 if TYPE_CHECKING:
     from ._xml import Element
@@ -27,12 +29,11 @@ class Frame:
     body: str = ""
 
 
-class SdfFrames(Reader):
+class SdfFrames(SdfIncludes):
     """Frames by name. Those of a nested model have its name and :: before theirs, as SDF has it."""
 
-    def __init__(self, path: Path, notes: Notes) -> None:
-        super().__init__(path)
-        self.notes = notes
+    def __init__(self, path: Path, packages: Packages, notes: Notes) -> None:
+        super().__init__(path, packages, notes)
         self.frames: dict[str, Frame] = {}
 
     def declare(self, model: Element) -> None:

@@ -1,4 +1,4 @@
-"""Reads URDF, and xacro where that is installed.
+"""Reads URDF.
 
 Over lxml, not yourdfpy, urdfdom or MuJoCo: these refuse a whole robot for one geometry, drop what they do not know
 without a word, and do not say in which line.
@@ -7,13 +7,12 @@ without a word, and do not say in which line.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._errors import Error
 from ._assemble import Part, Parts
 from ._meshes import MeshError, Meshes
 from ._model import (
@@ -31,7 +30,7 @@ from ._model import (
     Shape,
     SphereShape,
 )
-from ._xml import TURN, BadElement, Notes, Reader, library, name_of, pose_matrix, rpy_matrix
+from ._xml import TURN, BadElement, Notes, Reader, name_of, pose_matrix, rpy_matrix
 
 if TYPE_CHECKING:
     from ._xml import Element
@@ -220,13 +219,3 @@ class UrdfReader(Reader):
     def mimic(self, element: Element) -> Mimic:
         multiplier, offset = self.number(element, "multiplier", 1.0), self.number(element, "offset", 0.0)
         return Mimic(self.text(element, "joint"), multiplier, offset)
-
-
-def expand_xacro(path: Path, arguments: Mapping[str, str]) -> bytes:
-    """The URDF that a xacro file makes."""
-    xacro = library("xacro", f"{path}")
-    try:
-        return bytes(xacro.process_file(str(path), mappings=dict(arguments)).toprettyxml(encoding="utf-8"))
-    except Exception as error:  # whatever macros and the Python in them raise
-        advice = "; expand it where ROS is installed, and give the URDF" if "ament_index" in str(error) else ""
-        raise Error(f"{path}: xacro: {error}{advice}", "bad_file") from None

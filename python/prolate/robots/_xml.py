@@ -130,6 +130,11 @@ class Reader:
             notes.add("info", text, self.where(found[0]), link)
 
 
+def version_of(text: str | None) -> tuple[int, ...]:
+    """Major and minor number of SDF's; 1.6 where none is stated."""
+    return tuple(int(part) for part in (text or "1.6").split(".")[:2] if part.isdigit())
+
+
 def name_of(element: Element) -> str:
     """Its tag, with the namespace's prefix if it has one; of an entity, which is not followed, ``&name;``."""
     if not isinstance(element.tag, str):
