@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 from robot_parts import arm, baked, frames, l_shape, points_of_l, pose, wedge
 
 import prolate
-from prolate.robots import Robot, load, write_mjcf, write_sdf, write_spheres, write_urdf
+from prolate.robots import Note, Robot, Where, load, write_mjcf, write_sdf, write_spheres, write_urdf
 from prolate.robots._measure import beyond
 from prolate.robots._model import BoxShape, EllipsoidShape, Mimic, SphereShape
 from prolate.robots._proof import holds_ellipsoids, holds_points
@@ -81,7 +82,7 @@ def test_anchors_and_zeros_become_frames(write, name: str, tmp_path: Path) -> No
     turn = replace(turn, anchor=(0.1, -0.2, 0.3), zero=0.4)
     push = replace(push, mimic=Mimic("turn", 0.5, 0.1))
     anchored = replace(description, joints=(turn, push))
-    write(Robot(anchored).bake(only=("hull", "box")), tmp_path / name)
+    write(Robot(anchored).bake(only=("hull", "box"), clearance=1), tmp_path / name)
     again = load(tmp_path / name)
     mimic = next(joint.mimic for joint in again.joints if joint.name == "push")
     assert mimic.multiplier == 0.5 and mimic.offset == pytest.approx(0.1 + 0.5 * 0.4)
@@ -148,3 +149,16 @@ def test_the_proof_holds_of_the_numbers_that_are_read_again(name: str, only: str
             assert holds_points(read[cover.name][0], moved(place, points))
         else:
             assert holds_ellipsoids(read[cover.name], cover.baked.cut(), cover.rounding)
+
+
+@pytest.mark.parametrize("writer", [write_mjcf, write_sdf, write_urdf, write_spheres])
+def test_what_is_not_proved_is_not_written_unless_that_is_said(writer: Callable, bakes: Path, tmp_path: Path) -> None:
+    robot = baked("spheres", bakes)
+    lost = replace(robot, notes=(Note("error", "has no cover", Where(Path("arm.urdf"), 7), "hand"),))
+    loose = replace(robot, covers={**robot.covers, "base": replace(robot.covers["base"], proved=False)})
+    for one, why in ((lost, "arm.urdf:7: link hand: has no cover"), (loose, "link base: its cover is not proved")):
+        with pytest.raises(prolate.Error, match=f"{why}.* unproved=True") as error:
+            writer(one, tmp_path / "out")
+        assert error.value.code == "bad_mesh" and not list(tmp_path.iterdir())
+    writer(loose, tmp_path / "out", unproved=True)
+    assert (tmp_path / "out").exists()

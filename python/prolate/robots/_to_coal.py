@@ -18,9 +18,10 @@ from ._model import (
     Shape,
     SphereShape,
 )
+from ._writing import check_proved
 
 
-def geometry_model(robot: BakedRobot, model: Any) -> Any:
+def geometry_model(robot: BakedRobot, model: Any, *, unproved: bool = False) -> Any:
     """The covers as a ``pinocchio.GeometryModel``, for Pinocchio 3 and later. It has no collision pairs yet.
 
     Parameters
@@ -28,12 +29,16 @@ def geometry_model(robot: BakedRobot, model: Any) -> Any:
     robot : BakedRobot
     model : pinocchio.Model
         Of the same robot, as ``pinocchio.buildModelFromUrdf`` makes it: its frames have the names of the links.
+    unproved : bool
+        Take it even if something of the robot is missing, or a cover is not proved.
 
     Raises
     ------
     Error
-        ``code`` is ``"unsupported"`` if Pinocchio is not installed or a link is none of the model's frames.
+        ``code`` is ``"unsupported"`` if Pinocchio is not installed or a link is none of the model's frames,
+        ``"bad_mesh"`` for a robot that is not proved.
     """
+    check_proved(robot, unproved)
     try:
         pinocchio: Any = import_module("pinocchio")
     except ImportError as error:

@@ -9,10 +9,12 @@ from typing import Any
 from .._errors import Error
 from ._baked import BakedRobot
 from ._model import BoxShape, CapsuleShape, CylinderShape, EllipsoidShape, Geometry, MeshShape, SphereShape
-from ._writing import quaternion
+from ._writing import check_proved, quaternion
 
 
-def add_to_newton(robot: BakedRobot, builder: Any, bodies: Mapping[str, int], cfg: Any = None) -> list[int]:
+def add_to_newton(
+    robot: BakedRobot, builder: Any, bodies: Mapping[str, int], cfg: Any = None, *, unproved: bool = False
+) -> list[int]:
     """Add the covers to a ``newton.ModelBuilder``, for Newton 1.8 and later.
 
     Newton's contacts begin 0.1 m before shapes touch unless ``builder.rigid_gap`` is set; 0 is what covers need.
@@ -25,6 +27,8 @@ def add_to_newton(robot: BakedRobot, builder: Any, bodies: Mapping[str, int], cf
         The builder's bodies, by the names of links; -1 is the world.
     cfg : newton.ModelBuilder.ShapeConfig, optional
         Of all shapes. By default it is the builder's own with density 0, as links have their masses.
+    unproved : bool
+        Add it even if something of the robot is missing, or a cover is not proved.
 
     Returns
     -------
@@ -34,8 +38,9 @@ def add_to_newton(robot: BakedRobot, builder: Any, bodies: Mapping[str, int], cf
     Raises
     ------
     Error
-        ``code`` is ``"unsupported"`` if a link is not among the bodies.
+        ``code`` is ``"unsupported"`` if a link is not among the bodies, ``"bad_mesh"`` for a robot that is not proved.
     """
+    check_proved(robot, unproved)
     if cfg is None:
         cfg = builder.default_shape_cfg.copy()
         cfg.density = 0.0

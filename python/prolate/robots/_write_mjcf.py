@@ -28,7 +28,7 @@ from ._model import (
     PlaneShape,
     SphereShape,
 )
-from ._writing import Files, quaternion, text, unique
+from ._writing import Files, check_proved, quaternion, text, unique
 
 _COLLISION, _VISUAL = "collision", "visual"
 _MOST_IN_STL = 200_000  # triangles, for MuJoCo
@@ -41,6 +41,7 @@ def write_mjcf(
     floating: bool = False,
     visuals: bool = True,
     exclude: Iterable[tuple[str, str]] = (),
+    unproved: bool = False,
 ) -> None:
     """Write a robot and its covers for MuJoCo.
 
@@ -58,14 +59,18 @@ def write_mjcf(
         Write what is only seen, too; in group 2. Covers are in group 3.
     exclude : iterable of (str, str)
         Further pairs of links that never touch, besides those of the description.
+    unproved : bool
+        Write it even if something of the robot is missing, or a cover is not proved.
 
     Raises
     ------
     Error
-        ``code`` is ``"unsupported"`` for a floating joint that does not hang on the world, or ``"io"``.
+        ``code`` is ``"unsupported"`` for a floating joint that does not hang on the world, ``"bad_mesh"`` for a
+        robot that is not proved, or ``"io"``.
     ValueError
         ``path`` is what the robot was read from.
     """
+    check_proved(robot, unproved)
     _Mjcf(robot, Files.at(path, robot.description), visuals).write(floating, exclude)
 
 

@@ -26,7 +26,7 @@ from ._model import (
     SphereShape,
 )
 from ._rebase import rebased
-from ._writing import Files, roll_pitch_yaw, text, unique
+from ._writing import Files, check_proved, roll_pitch_yaw, text, unique
 
 _KINDS = {
     "fixed": "fixed",
@@ -38,7 +38,12 @@ _KINDS = {
 
 
 def write_sdf(
-    robot: BakedRobot, path: Union[str, os.PathLike[str]], *, floating: bool = False, visuals: bool = True
+    robot: BakedRobot,
+    path: Union[str, os.PathLike[str]],
+    *,
+    floating: bool = False,
+    visuals: bool = True,
+    unproved: bool = False,
 ) -> None:
     """Write a robot and its covers as a model in SDF.
 
@@ -50,14 +55,18 @@ def write_sdf(
         Let the root move freely; or else a joint fixes it to the world.
     visuals : bool
         Write what is only seen, too.
+    unproved : bool
+        Write it even if something of the robot is missing, or a cover is not proved.
 
     Raises
     ------
     Error
-        ``code`` is ``"unsupported"`` for a joint that SDF cannot have, a planar or a floating one, or ``"io"``.
+        ``code`` is ``"unsupported"`` for a joint that SDF cannot have, a planar or a floating one, ``"bad_mesh"``
+        for a robot that is not proved, or ``"io"``.
     ValueError
         ``path`` is what the robot was read from.
     """
+    check_proved(robot, unproved)
     _Sdf(rebased(robot), Files.at(path, robot.description), visuals).write(floating)
 
 

@@ -9,17 +9,25 @@ from typing import Union
 from .._errors import Error
 from ._baked import BakedRobot, LinkCover
 from ._model import SphereShape
-from ._writing import Files
+from ._writing import Files, check_proved
 
 
-def write_spheres(robot: BakedRobot, path: Union[str, os.PathLike[str]]) -> None:
+def write_spheres(robot: BakedRobot, path: Union[str, os.PathLike[str]], *, unproved: bool = False) -> None:
     """Write ``collision_spheres`` as cuRobo reads them, in YAML: centres in the frames of links, and radii; metres.
+
+    Parameters
+    ----------
+    path : path-like
+    unproved : bool
+        Write it even if something of the robot is missing, or a cover is not proved.
 
     Raises
     ------
     Error
-        ``code`` is ``"unsupported"`` if a cover is not of spheres only, ``"io"``.
+        ``code`` is ``"unsupported"`` if a cover is not of spheres only, ``"bad_mesh"`` for a robot that is not proved,
+        or ``"io"``.
     """
+    check_proved(robot, unproved)
     lines = ["collision_spheres:"]
     for cover in robot.covers.values():
         lines.append(f"  {json.dumps(cover.name)}:")

@@ -29,7 +29,7 @@ from ._model import (
 )
 from ._rebase import rebased
 from ._solids import polyhedron
-from ._writing import Files, roll_pitch_yaw, text
+from ._writing import Files, check_proved, roll_pitch_yaw, text
 
 _SIDES = 1 / np.cos(np.pi / 32)  #: PyBullet makes a cylinder a prism of 32 sides in it; one larger by this holds it
 _KINDS = {"fixed", "revolute", "continuous", "prismatic", "planar", "floating"}
@@ -41,6 +41,7 @@ def write_urdf(
     *,
     ellipsoids: Literal["mesh", "drake"] = "mesh",
     visuals: bool = True,
+    unproved: bool = False,
 ) -> None:
     """Write a robot and its covers as URDF.
 
@@ -54,16 +55,20 @@ def write_urdf(
         URDF has no ellipsoids. Write polyhedra around them, or ``<drake:ellipsoid>``, which only Drake reads.
     visuals : bool
         Write what is only seen, too.
+    unproved : bool
+        Write it even if something of the robot is missing, or a cover is not proved.
 
     Raises
     ------
     Error
-        ``code`` is ``"unsupported"`` for a joint that URDF cannot have, a ball, or ``"io"``.
+        ``code`` is ``"unsupported"`` for a joint that URDF cannot have, a ball, ``"bad_mesh"`` for a robot that is
+        not proved, or ``"io"``.
     ValueError
         For an option, or if ``path`` is what the robot was read from.
     """
     if ellipsoids not in ("mesh", "drake"):
         raise ValueError(f'ellipsoids: must be "mesh" or "drake", not {ellipsoids!r}')
+    check_proved(robot, unproved)
     _Urdf(rebased(robot), Files.at(path, robot.description), ellipsoids, visuals).write()
 
 

@@ -6,7 +6,7 @@ import os
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Union
+from typing import TYPE_CHECKING, Literal, Union
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,6 +14,21 @@ import numpy as np
 from .._bake_many import write_atomically
 from .._errors import Error, path_of
 from ._model import Description, Matrix, MeshShape
+
+if TYPE_CHECKING:
+    from ._baked import BakedRobot
+
+
+def check_proved(robot: BakedRobot, unproved: bool) -> None:
+    """Raises Error, ``code`` ``"bad_mesh"``, for a robot that is not proved, unless that is meant."""
+    if unproved or robot.proved:
+        return
+    errors = [note for note in (*robot.description.notes, *robot.notes) if note.kind == "error"]
+    loose = [f"link {name}: its cover is not proved" for name, cover in robot.covers.items() if not cover.proved]
+    why = "; ".join([*map(str, errors), *loose]) or "a link has no cover"
+    raise Error(
+        f"not written, as it is not proved to hold the robot: {why}. unproved=True writes it all the same", "bad_mesh"
+    )
 
 
 def text(*values: float) -> str:
