@@ -26,6 +26,7 @@ from prolate.robots import (
     render,
     view_page,
 )
+from prolate.robots._xml import rpy_matrix
 
 # What the script finds in a browser: a document that holds the robot, and a picture that takes everything.
 BROWSER = """
@@ -37,8 +38,14 @@ const document = {getElementById: (id) => (id === 'robot' ? {textContent: ROBOT}
 const window = any, location = {hash: ''};
 """
 REPORT = """
-console.log(JSON.stringify(CONFIGURATIONS.map((q) => ({frames: framesOf(q), pairs: touchingPairs(framesOf(q))}))));
+console.log(JSON.stringify({
+  found: CONFIGURATIONS.map((q) => ({frames: framesOf(q), pairs: touchingPairs(framesOf(q))})),
+  turns: ANGLES.map((a) => [quaternionOf(a), quaternionOf(anglesOf(quaternionOf(a)))]),
+}));
 """
+
+# Roll, pitch, yaw; also with a pitch of a quarter turn.
+ANGLES = [[0, 0, 0], [0.5, -1.2, 3], [-3, 0.1, -2], [0.4, np.pi / 2, -0.9], [2, -np.pi / 2, 1]]
 
 
 def robot_of(shapes, kinds):
@@ -95,11 +102,15 @@ def test_the_page_computes_what_the_library_does(baked, tmp_path):
     script = re.search(r'<script nonce="robot">(.*?)</script>', page, re.DOTALL)[1]
     program = tmp_path / "page.js"
     program.write_text(
-        f"const ROBOT = {json.dumps(data)}, CONFIGURATIONS = {json.dumps(q.tolist())};{BROWSER}{script}{REPORT}"
+        f"const ROBOT = {json.dumps(data)}, CONFIGURATIONS = {json.dumps(q.tolist())}, ANGLES = {json.dumps(ANGLES)};"
+        f"{BROWSER}{script}{REPORT}"
     )
     done = subprocess.run(["node", str(program)], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    found, turns = json.loads(done.stdout).values()
+    for angles, both in zip(ANGLES, turns):  # of sliders, there and back
+        for quaternion in both:
+            np.testing.assert_allclose(matrix([0, 0, 0, *quaternion])[:3, :3], rpy_matrix(angles), atol=1e-12)
 
     frames = checks.fk(q)
     pairs, each = checks.pairs(), checks.collide(q, first_only=False)

@@ -118,13 +118,15 @@ def _joints(baked: BakedRobot, index: dict[str, int]) -> list[dict[str, Any]]:
                 "scale": scale,
                 "offset": offset - joint.zero,
                 "sliders": _sliders(joint),
+                "quaternion": {"ball": 0, "floating": 3}.get(joint.kind),
             }
         )
     return out
 
 
 def _sliders(joint: Joint) -> list[tuple[str, float, float]]:
-    """What a joint's first coordinates are called, and their ranges. Quaternions have no sliders."""
+    """What a joint's first coordinates are called, and their ranges. A quaternion, which ``quaternion`` says the
+    place of, has sliders of another kind."""
     if joint.mimic or joint.kind in ("fixed", "ball"):
         return []
     if joint.kind in ("planar", "floating"):

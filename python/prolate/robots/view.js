@@ -281,20 +281,49 @@ function update() {
   draw();
 }
 const sliders = [];
-function addSlider(label, coordinate, low, high) {
+function addSlider(label, low, high, read, write) {
   const row = document.createElement('label'), text = document.createElement('span'), input = document.createElement('input'),
         output = document.createElement('output');
   row.className = 'joint';
   text.textContent = text.title = label;
   Object.assign(input, {type: 'range', min: low, max: high, step: (high - low) / 1000 || 1});
-  const show = () => { input.value = state.q[coordinate]; output.textContent = state.q[coordinate].toFixed(3); };
-  input.addEventListener('input', () => { state.q[coordinate] = Number(input.value); show(); update(); });
+  const show = () => { input.value = read(); output.textContent = read().toFixed(3); };
+  input.addEventListener('input', () => { write(Number(input.value)); show(); update(); });
   row.append(text, input, output);
   element('joints').append(row);
-  sliders.push({show, random: () => { state.q[coordinate] = low + Math.random() * (high - low); }});
+  sliders.push({show, random: () => write(low + Math.random() * (high - low))});
 }
-for (const joint of robot.joints)
-  joint.sliders.forEach(([suffix, low, high], k) => addSlider(joint.name + suffix, joint.at + k, low, high));
+// Angles about the fixed axes x, then y, then z, as URDF has them; and back. Quaternions are x y z w.
+function quaternionOf([roll, pitch, yaw]) {
+  const [c, d, e] = [roll, pitch, yaw].map((a) => Math.cos(a / 2)), [s, t, u] = [roll, pitch, yaw].map((a) => Math.sin(a / 2));
+  return [s * d * e - c * t * u, c * t * e + s * d * u, c * d * u - s * t * e, c * d * e + s * t * u];
+}
+function anglesOf(q) {
+  const m = turnOf(q), roll = Math.atan2(m[9], m[10]), s = Math.sin(roll), c = Math.cos(roll);
+  // Where the pitch is a quarter turn the roll is any, and the yaw makes up for it.
+  return [roll, Math.atan2(-m[8], Math.hypot(m[0], m[4])), Math.atan2(s * m[2] - c * m[1], c * m[5] - s * m[6])];
+}
+// What was last set, as angles: other angles may mean the same rotation. It holds until the rotation is another one.
+function addTurn(name, first) {
+  let angles = [0, 0, 0], meant = [0, 0, 0, 1];
+  const present = () => {
+    const now = state.q.slice(first, first + 4);
+    if (now.some((c, i) => c !== meant[i])) meant = now, angles = anglesOf(now);
+    return angles;
+  };
+  ['roll', 'pitch', 'yaw'].forEach((word, k) => {
+    const most = k === 1 ? Math.PI / 2 : Math.PI;
+    addSlider(`${name} ${word}`, -most, most, () => present()[k], (value) => {
+      angles = present().map((angle, i) => (i === k ? value : angle));
+      state.q.splice(first, 4, ...(meant = quaternionOf(angles)));
+    });
+  });
+}
+for (const joint of robot.joints) {
+  joint.sliders.forEach(([suffix, low, high], k) =>
+    addSlider(joint.name + suffix, low, high, () => state.q[joint.at + k], (value) => { state.q[joint.at + k] = value; }));
+  if (joint.quaternion !== null) addTurn(joint.name, joint.at + joint.quaternion);
+}
 const showAll = () => { sliders.forEach((slider) => slider.show()); update(); };
 element('home').addEventListener('click', () => { state.q = [...robot.home]; showAll(); });
 element('random').addEventListener('click', () => { sliders.forEach((slider) => slider.random()); showAll(); });
