@@ -8,6 +8,7 @@ Rapier's function takes no count: it makes as many as its defaults lead to.
 OUT has the hulls one after the other, each a closed surface oriented outwards. The last line of the standard output is
 the cost, as JSON. A run of more than SECONDS is killed by SIGALRM.
 """
+
 import importlib.metadata
 import json
 import resource
@@ -84,8 +85,17 @@ def main():
     hulls = decompose(name, int(count), *mesh)
     wall, cpu = time.monotonic() - wall, time.process_time() - cpu
     write(target, hulls)
-    print(json.dumps({"hulls": len(hulls), "wall_seconds": wall, "cpu_seconds": cpu, "version": installed(name),
-                      "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}))
+    print(
+        json.dumps(
+            {
+                "hulls": len(hulls),
+                "wall_seconds": wall,
+                "cpu_seconds": cpu,
+                "version": installed(name),
+                "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            }
+        )
+    )
 
 
 main()

@@ -106,6 +106,7 @@ def main() -> None:
     parser.add_argument("--budget", type=int, default=200)
     parser.add_argument("--quality", default="fast")
     parser.add_argument("--seconds", type=float, default=1.0, help="of each fall")
+    parser.add_argument("--rounds", type=int, default=7, help="falls of each")
     parser.add_argument("--clearance", action="store_true", help="covers of 5 mm, too")
     parser.add_argument("--tables", action="store_true", help="a line for each link")
     options = parser.parse_args()
@@ -139,12 +140,16 @@ def one(name: str, file: Path, stands: bool, folder: Path, options: argparse.Nam
         exclude = touching(own, folder)
         more = [pair for pair in touching(baked, folder) if pair not in exclude]
         print(f"    touching at 0: {len(exclude)} pairs of links, by covers {len(more)} more")
-        # In turns, the best of three: other programs disturb these.
-        falls = [[fall(r, folder, exclude + more, options.seconds) for r in (own, baked)] for _ in range(3)]
-        speeds = [max(turns) for turns in zip(*falls)]
+        # In turns, and the median of the turns' ratios: other programs disturb these.
+        falls = np.array(
+            [[fall(r, folder, exclude + more, options.seconds) for r in (own, baked)] for _ in range(options.rounds)]
+        )
+        (by_hulls, contacts_of_hulls), (by_covers, contacts) = np.median(falls, axis=0)
+        ratios = falls[:, 1, 0] / falls[:, 0, 0]
         print(
-            f"    MuJoCo: {speeds[1][0]:.0f} steps a second by covers, {speeds[0][0]:.0f} by the meshes' hulls "
-            f"({speeds[1][0] / speeds[0][0]:.2f}); contacts a step {speeds[1][1]:.1f} and {speeds[0][1]:.1f}"
+            f"    MuJoCo: {by_covers:.0f} steps a second by covers, {by_hulls:.0f} by the meshes' hulls "
+            f"({np.median(ratios):.2f}, {ratios.min():.2f} to {ratios.max():.2f}); contacts a step {contacts:.1f} and "
+            f"{contacts_of_hulls:.1f}"
         )
         if stands:
             heights = [resting_height(r, folder) for r in (own, baked)]
