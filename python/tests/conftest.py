@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
@@ -88,8 +90,11 @@ def cover():
 
 @pytest.fixture(scope="session")
 def bakes(tmp_path_factory):
-    """A cache of bakes that all tests share."""
-    return tmp_path_factory.mktemp("bakes")
+    """A cache of bakes that all tests share, also those that other processes run (pytest-xdist)."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "bakes"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 @pytest.fixture

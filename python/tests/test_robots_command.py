@@ -14,7 +14,7 @@ from prolate.robots._command import main
 pytestmark = pytest.mark.usefixtures("own_folder")
 
 ROBOT = """<robot name="r">
-<link name="a"><collision><geometry><mesh filename="package://my_parts/part.obj" scale="1 1 2"/></geometry></collision>
+<link name="a"><collision><geometry><mesh filename="package://parts/part.obj" scale="1 1 2"/></geometry></collision>
 <inertial><mass value="1.5"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
 <link name="b"><collision><geometry><sphere radius="0.5"/></geometry></collision></link>
 <joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>
@@ -30,7 +30,7 @@ def robot(tmp_path):
 
 
 def test_info_says_what_is_there(robot, capsys):
-    assert main(["info", str(robot), "--package", f"my_parts={robot.parent / 'here'}"]) == 0
+    assert main(["info", str(robot), "--package", f"parts={robot.parent / 'here'}"]) == 0
     out, err = capsys.readouterr()
     assert "r: urdf, 2 links, 1 joints, 1 coordinates" in out and "a: root, 1.5 kg" in out
     assert "mesh part.obj 4 triangles, 1 x 2 x 6 m" in out and "b: j (continuous) of a" in out
@@ -40,7 +40,7 @@ def test_info_says_what_is_there(robot, capsys):
 def test_info_names_what_is_missing_and_goes_on(robot, capsys):
     assert main(["info", str(robot), "--quiet"]) == 1
     out, err = capsys.readouterr()
-    assert "2 links" in out and err.startswith(f"error: {robot}:2: link a: ") and "--package my_parts=FOLDER" in err
+    assert "2 links" in out and err.startswith(f"error: {robot}:2: link a: ") and "--package parts=FOLDER" in err
     assert err.count("\n") == 1
     assert main(["info", str(robot), "--json"]) == 1
     said = json.loads(capsys.readouterr().out)
@@ -84,7 +84,7 @@ def bodies(tmp_path, monkeypatch, cache):
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "part.obj").write_text(TETRAHEDRON)
-    (tmp_path / "robot.urdf").write_text(ROBOT.replace("package://my_parts/", ""))
+    (tmp_path / "robot.urdf").write_text(ROBOT.replace("package://parts/", ""))
 
 
 def test_bake_covers_and_keeps_what_it_did(bodies, cache, capsys):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,14 +12,14 @@ import pytest
 from robot_parts import arm, baked, distance_to_l, l_shape, points_of_l, pose, wedge
 
 from prolate.robots._baking import _measured
-from prolate.robots._covers import SINGLE, Options, Solid
-from prolate.robots._fits import around, hull_within, thickened
+from prolate.robots._covers import SINGLE, Cover, Options, Solid
+from prolate.robots._fits import _uninterrupted, around, hull_within, thickened
 from prolate.robots._measure import beyond, farthest
-from prolate.robots._model import BoxShape, Description, EllipsoidShape, Geometry, Link, MeshShape
+from prolate.robots._model import BoxShape, Description, EllipsoidShape, Geometry, Link, MeshShape, SphereShape
 from prolate.robots._pieces import Pieces
-from prolate.robots._proof import holds_ellipsoids, holds_points
+from prolate.robots._proof import holds_ellipsoids, holds_points, holds_solid
 from prolate.robots._robot import Robot
-from prolate.robots._solids import grown, hull_triangles, inverse, merged, moved, polyhedron, volume
+from prolate.robots._solids import cut, grown, hull_triangles, inverse, merged, moved, polyhedron, volume
 
 
 def cloud(seed: int) -> np.ndarray:
@@ -50,6 +52,17 @@ def test_hulls_of_few_vertices_hold_the_points_from_outside(most: int) -> None:
         assert holds_points(grown(hull, 1e-12), points)
         sizes.append(volume(hull.shape) / volume(around(points, "box").shape))
     assert max(sizes) <= 1.001  # a box is a hull of eight
+
+
+@pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="signals come to the main thread")
+def test_an_interrupt_while_a_library_is_imported_counts_afterwards() -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), _uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        done.append(True)
+    assert done and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with _uninterrupted():
+        pass
 
 
 def test_hulls_of_few_enough_vertices_are_exact() -> None:
@@ -120,6 +133,24 @@ def test_farthest_is_a_bound_and_not_a_loose_one() -> None:
     assert true <= farthest([hull], solid.exact) <= 1.03 * true
     assert farthest([hull], solid.exact, 1.03 * true) <= 1.03 * true
     assert farthest([hull], solid.exact, 0.97 * true) > 0.97 * true
+
+
+@pytest.mark.parametrize("bump", [0.0, -0.01])
+def test_how_far_a_hull_sticks_out_of_what_is_nearly_convex(bump: float) -> None:
+    """Of a ball of triangles, one corner of which is pushed in."""
+    vertices, faces = polyhedron(SphereShape(0.1))
+    vertices[7] *= 1 + bump / 0.1
+    solid = Solid(Link("ball"), [Geometry(MeshShape(moved(pose(3), vertices), faces))], Options())
+    assert -bump / 2 <= solid.flaw <= -4 * bump + 1e-8
+    cover = next(one for one in solid.convex if one.kind == "hull")
+    assert -bump / 2 <= solid.farthest(cover) <= -2 * bump + 2 * solid.growth + 1e-8
+    box = Cover("box", (around(solid.points, "box"),), 0, True)
+    true = np.linalg.norm(merged(box.geometries)[0] - pose(3)[:3, 3], axis=1).max() - 0.1
+    assert true - 2e-3 <= solid.farthest(box) <= true + 2e-3  # the polyhedron's faces are up to so far from the ball
+
+
+def test_what_is_not_convex_has_no_small_flaw() -> None:
+    assert Solid(Link("one"), [Geometry(l_shape())], Options()).flaw >= 0.12
 
 
 def test_the_cache_gives_the_same_covers_and_believes_nothing_damaged(tmp_path: Path) -> None:
@@ -242,3 +273,73 @@ def test_links_of_the_same_meshes_are_baked_once(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("prolate.robots._baking._measured", lambda *them: made.append(them) or _measured(*them))
     covers = Robot(twins).bake(ellipsoids=2).covers
     assert len(made) == 1 and covers["shell"].name == "shell" and covers["twin"].name == "twin"
+
+
+def slabs_around(place: np.ndarray, thick: float) -> list[Geometry]:
+    """Six boxes along the faces of a cube of 1 m, so thick."""
+    found = []
+    for axis in range(3):
+        for side in (0.0, 1.0 - thick):
+            low, high = np.zeros(3), np.ones(3)
+            low[axis], high[axis] = side, side + thick
+            corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+            found.append(Geometry(MeshShape(*hull_triangles(moved(place, corners)))))
+    return found
+
+
+def cube_of(place: np.ndarray) -> Solid:
+    body = np.eye(4)
+    body[:3, 3] = 0.5
+    mesh = MeshShape(*merged([Geometry(BoxShape((1.0, 1.0, 1.0)), place @ body)]))
+    return Solid(Link("cube"), [Geometry(mesh)], Options())
+
+
+def holds(bodies: list[Geometry], solid: Solid, by: float = 1e-5) -> bool:
+    """All bodies grown by as much."""
+    return holds_solid([grown(one, by) for one in bodies], solid.vertices[solid.faces], solid.exact, by)
+
+
+def test_the_proof_of_several_hulls_sees_what_is_left_open() -> None:
+    place = pose(4)
+    solid = cube_of(place)
+    assert holds(slabs_around(place, 0.5), solid)
+    assert not holds(slabs_around(place, 0.4), solid)  # a room within
+    assert not holds(slabs_around(place, 0.49999), solid, 1e-6)
+    for without in range(6):  # what is left of them holds the cube, but for five quarters of one side's half
+        rest = slabs_around(place, 0.5)
+        del rest[without]
+        assert holds(rest, solid)
+        assert not holds([one for i, one in enumerate(slabs_around(place, 0.3)) if i != without], solid)
+    halves = [slabs_around(place, 0.5)[0], slabs_around(place, 0.5)[1]]
+    assert holds(halves, solid)
+    shift = np.eye(4)
+    shift[:3, 3] = 3e-5 * place[:3, 0]
+    apart = [halves[0], replace(halves[1], pose=shift)]
+    assert not holds(apart, solid) and holds(apart, solid, 6e-5)
+
+
+@pytest.mark.parametrize("count", [3, 12])
+def test_the_proof_of_pieces_holds_and_notices_a_smaller_one(count: int) -> None:
+    mesh = bowl()
+    solid = Solid(Link("bowl"), [Geometry(mesh)], Options())
+    cover = next(one for one in solid.hulls(64) if len(one.geometries) >= count)
+    assert solid.is_proved(cover)
+    for i in range(0, len(cover.geometries), 3):
+        smaller = list(cover.geometries)
+        smaller[i] = grown(smaller[i], -1e-3)
+        assert not solid.is_proved(replace(cover, geometries=tuple(smaller)))
+        assert not solid.is_proved(replace(cover, geometries=(*smaller[:i], *smaller[i + 1 :])))
+
+
+def test_cuts_lose_nothing() -> None:
+    random = np.random.default_rng(1)
+    triangles = random.normal(size=(400, 3, 3))
+    triangles[:100, 0, 2], triangles[100:150, :2, 2], triangles[150:160, :, 2] = 0, 0, 0  # corners in the plane
+    below, above = cut(triangles, triangles[:, :, 2])
+
+    def area(of: np.ndarray) -> float:
+        return np.linalg.norm(np.cross(of[:, 1] - of[:, 0], of[:, 2] - of[:, 0]), axis=1).sum() / 2
+
+    flat = area(triangles[150:160])  # is in both
+    assert area(below) + area(above) == pytest.approx(area(triangles) + flat)
+    assert (below[:, :, 2] <= 1e-12).all() and (above[:, :, 2] >= -1e-12).all()

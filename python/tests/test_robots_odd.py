@@ -205,7 +205,7 @@ def test_what_is_as_thin_as_rounding_has_covers(tmp_path: Path, kind: Any) -> No
     for size in ("1 1 1e-12", "1e-9 1 1e-9"):
         path = tmp_path / "thin.urdf"
         path.write_text(f'<robot><link name="a">{BOX.replace("0.1 0.1 0.3", size)}</link></robot>')
-        baked = robots.Robot.load(path).bake(only=kind)
+        baked = robots.Robot.load(path).bake(only=kind, clearance=1)
         assert baked.proved and baked.covers["a"].kind in (kind, "own", "ellipsoids")
 
 

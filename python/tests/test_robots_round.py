@@ -31,7 +31,7 @@ def exact(tmp_path_factory):
     folder = tmp_path_factory.mktemp("round")
     (folder / "part.obj").write_text(TETRAHEDRON)
     (folder / "robot.urdf").write_text(ROBOT)
-    return robots.Robot(robots.load(folder / "robot.urdf")).bake(only="hull")
+    return robots.Robot(robots.load(folder / "robot.urdf")).bake(only="hull", clearance=10)
 
 
 WRITERS = {"robot.xml": robots.write_mjcf, "robot.sdf": robots.write_sdf, "robot.urdf": robots.write_urdf}

@@ -78,7 +78,7 @@ def test_mujoco_places_each_cover_around_its_link(only: str | None, bakes: Path,
 
 def test_masses_and_limits_are_the_descriptions_own(tmp_path: Path) -> None:
     description = arm()
-    model = compiled(Robot(description).bake(only="hull"), tmp_path / "arm.xml", floating=True)
+    model = compiled(Robot(description).bake(only="hull", clearance=1), tmp_path / "arm.xml", floating=True)
     np.testing.assert_allclose(model.body_mass[1:], 1.5)
     inertial = description.links[0].inertial
     for body in (1, 2, 3):
@@ -132,7 +132,7 @@ def test_neighbours_of_a_fixed_root_do_not_touch(tmp_path: Path) -> None:
 
 def test_the_arena_holds_what_many_ellipsoids_touch(tmp_path: Path) -> None:
     """By default MuJoCo's arena overflows here, and the bodies fall freely."""
-    robot = Robot(arm()).bake(only="hull")
+    robot = Robot(arm()).bake(only="hull", clearance=1)
     many = tuple(Geometry(EllipsoidShape((0.03, 0.05, 0.04)), pose(100 + i, 0.1)) for i in range(120))
     covers = {name: replace(cover, geometries=many, baked=None) for name, cover in robot.covers.items()}
     joints = tuple(replace(one, origin=pose(50, 0.01)) for one in robot.description.joints)
@@ -151,7 +151,7 @@ def test_flat_visuals_and_links_without_mass_or_inertia_are_accepted(tmp_path: P
         replace(link, visuals=(Geometry(flat, pose(8)),), inertial=inertial)
         for link, inertial in zip(description.links, bare)
     )
-    robot = Robot(replace(description, links=links)).bake(only="hull")
+    robot = Robot(replace(description, links=links)).bake(only="hull", clearance=1)
     model = compiled(robot, tmp_path / "arm.xml")
     assert (model.body_mass[2:] > 0).all() and (model.body_inertia[2:] > 0).all()
 
@@ -170,7 +170,7 @@ def test_inertia_that_no_body_has_is_mended(tmp_path: Path, moments: tuple[float
     turn = pose(8)[:3, :3]
     inertial = Inertial(2.0, turn @ np.diag(np.array(moments) * 1e-3) @ turn.T, pose(9))
     links = tuple(replace(link, inertial=inertial) for link in description.links)
-    robot = Robot(replace(description, links=links)).bake(only="hull")
+    robot = Robot(replace(description, links=links)).bake(only="hull", clearance=1)
     model = compiled(robot, tmp_path / "arm.xml")
     found = np.sort(model.body_inertia[-1])
     assert found[0] > 0 and found[2] <= found[0] + found[1] and model.body_mass[-1] == 2

@@ -1,13 +1,12 @@
-# cmake -D WORK=<scratch folder> -P layering_selftest.cmake
+# cmake -D ROOT=<source tree> -D WORK=<scratch folder> -P layering_selftest.cmake
 #
-# Breaks each rule of layering.cmake once, in a tree of one file a layer, and demands that the check fails and names the
-# place.
+# Breaks each rule of layering.cmake once, in a copy of the tree, and demands that the check fails and names the place.
 # Also plants includes that are allowed, which must pass: a check that refuses everything would be no check.
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")
-foreach(layer include/prolate src query builder capi viewer cli python)
-  file(WRITE "${WORK}/${layer}/first.hpp" "#pragma once\n#include <cstdint>\n")
+foreach(folder include src query builder capi viewer cli python)
+  file(COPY "${ROOT}/${folder}" DESTINATION "${WORK}")
 endforeach()
 
 function(check result_out message_out)
@@ -20,7 +19,11 @@ endfunction()
 # plant(EXPECT FILE TEXT): TEXT becomes line 2 of FILE, which then must be found (EXPECT bad) or not (EXPECT good).
 function(plant expect file text)
   set(path "${WORK}/${file}")
-  file(WRITE "${path}" "// first line\n${text}\n")
+  set(original "")
+  if(EXISTS "${path}")
+    file(READ "${path}" original)
+  endif()
+  file(WRITE "${path}" "// first line\n${text}\n${original}")
   check(result message)
   string(FIND "\n${message}" "\n${file}:2: " at)
   if(expect STREQUAL "bad" AND (result EQUAL 0 OR at EQUAL -1))
@@ -28,12 +31,16 @@ function(plant expect file text)
   elseif(expect STREQUAL "good" AND NOT result EQUAL 0)
     message(SEND_ERROR "wrongly refused in ${file}: ${text}\n${message}")
   endif()
-  file(REMOVE "${path}")
+  if(original STREQUAL "")
+    file(REMOVE "${path}")
+  else()
+    file(WRITE "${path}" "${original}")
+  endif()
 endfunction()
 
 check(result message)
 if(NOT result EQUAL 0)
-  message(FATAL_ERROR "wrongly refused, as it stands:\n${message}")
+  message(FATAL_ERROR "the tree itself breaks a rule:\n${message}")
 endif()
 
 # query knows neither the builder nor its libraries, in either form of include.

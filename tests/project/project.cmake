@@ -10,7 +10,7 @@ set(scratch ${CMAKE_CURRENT_BINARY_DIR}/scratch)
 
 # Includes.
 script_test(project.layering layering.cmake -D ROOT=${PROJECT_SOURCE_DIR})
-script_test(project.layering_selftest layering_selftest.cmake -D WORK=${scratch}/layering)
+script_test(project.layering_selftest layering_selftest.cmake -D ROOT=${PROJECT_SOURCE_DIR} -D WORK=${scratch}/layering)
 script_test(project.include_graph include_graph.cmake -D ROOT=${PROJECT_SOURCE_DIR})
 script_test(project.include_graph_selftest include_graph_selftest.cmake -D ROOT=${PROJECT_SOURCE_DIR}
   -D WORK=${scratch}/include_graph)
@@ -67,7 +67,7 @@ script_test(project.readme_selftest readme_selftest.cmake -D EXAMPLES=${PROJECT_
 if(PROLATE_BUILD_BUILDER)
   foreach(how installed subdirectory query_only)
     script_test(package.${how} consumer.cmake -D HOW=${how} -D ROOT=${PROJECT_SOURCE_DIR} -D BUILD=${PROJECT_BINARY_DIR}
-      -D WORK=${scratch}/package -D CXX=${CMAKE_CXX_COMPILER} PROPERTIES LABELS package COST 100) # the longest go first
+      -D WORK=${scratch}/package -D CXX=${CMAKE_CXX_COMPILER} PROPERTIES LABELS package)
   endforeach()
   set_tests_properties(package.installed PROPERTIES FIXTURES_SETUP baked_trees)
   set_tests_properties(package.query_only PROPERTIES FIXTURES_REQUIRED baked_trees)

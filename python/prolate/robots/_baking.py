@@ -140,7 +140,7 @@ def _measured(solid: Solid, cover: Cover, clearance: float) -> LinkCover:
         outside_ratio=outside / solid.volume if closed and solid.volume > 0 else float("nan"),
         clearance=clearance,
         mean_distance=mean_distance(cover.geometries, solid.exact, solid.options.threads),
-        proved=cover.proved,
+        proved=solid.is_proved(cover),
         rounding=solid.rounding,
         baked=cover.tree,
     )

@@ -14,10 +14,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from .. import Asset, Ellipsoids, Tree, least_clearance
+from .. import Asset, Ellipsoids, Tree, least_clearance, signed_distance
 from .._bake_many import bake_asset
 from ._fits import around, hull_within, thickened
-from ._measure import farthest
+from ._measure import farthest, flaw
 from ._model import (
     BoxShape,
     CapsuleShape,
@@ -30,7 +30,7 @@ from ._model import (
     SphereShape,
 )
 from ._pieces import Pieces
-from ._proof import holds_ellipsoids, holds_points
+from ._proof import holds_ellipsoids, holds_points, holds_solid
 from ._solids import Faces, grown, hull_triangles, is_flat, merged, volume, volume_of_hull
 
 Kind = Literal["ellipsoids", "spheres", "sphere", "box", "capsule", "cylinder", "hull"]
@@ -223,7 +223,34 @@ class Solid:
         """How far the cover sticks out, metres: a bound; with a ``limit``, just good enough to tell if that is kept."""
         if cover.tree is not None:
             return cover.tree.info.levels[-1].hausdorff_max + self.growth
+        at_corners = self._farthest_corner(cover)
+        close = at_corners <= (limit or 0.0) or self.flaw <= max(self.growth, 0.01 * at_corners)
+        if close and at_corners < float("inf"):
+            return at_corners
+        return min(at_corners, self._farthest_cell(cover, limit))
+
+    @cached_property
+    def flaw(self) -> float:
+        """How far the solid is from being convex, metres: a bound."""
+        return flaw(self.vertices, self.faces, self.exact) if len(self.points) else float("inf")
+
+    def _farthest_corner(self, cover: Cover) -> float:
+        """As :meth:`farthest`, for polyhedra around what is convex: distances from that are greatest at corners."""
+        if not all(isinstance(one.shape, (BoxShape, MeshShape)) for one in cover.geometries):
+            return float("inf")
+        corners = merged(cover.geometries)[0]
+        return self.flaw + float(signed_distance(self.exact, corners, threads=self.options.threads).upper.max())
+
+    def _farthest_cell(self, cover: Cover, limit: float | None) -> float:
         return farthest(cover.geometries, self.exact, limit, self.options.threads, 20_000 if limit is None else 300_000)
+
+    def is_proved(self, cover: Cover) -> bool:
+        """Is it? Where several hulls cover the solid, of the hulls and triangles alone, too: how they were found, which
+        ``proved`` is about, does not matter then."""
+        if not cover.proved or cover.kind != "hull" or len(cover.geometries) < 2:
+            return cover.proved
+        triangles = self.vertices[self.faces]
+        return holds_solid(cover.geometries, triangles, self.exact, self.growth, self.options.threads)
 
     def _around(self, kind: Kind, body: Geometry) -> Cover:
         body = grown(body, self.growth)

@@ -6,7 +6,11 @@ Each is then made to hold the points, whatever rounding and optimisers did.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -155,7 +159,25 @@ _FITS: dict[str, Callable[[Matrix], Geometry]] = {
 
 def _trimesh(part: str) -> Any:
     """Imported when it is needed: it takes as long as all else together."""
-    return import_module(f"trimesh.{part}")
+    with contextlib.nullcontext() if "trimesh" in sys.modules else _uninterrupted():
+        return import_module(f"trimesh.{part}")
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Ctrl-C counts afterwards: trimesh, while it is imported, takes it for the lack of a library, and goes on."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is None or threading.current_thread() is not threading.main_thread():  # only there it interrupts Python
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _rigid(pose: Matrix) -> Matrix:

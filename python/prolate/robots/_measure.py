@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .. import Tree, signed_distance
 from ._model import Geometry, Matrix
-from ._solids import inverse, merged, moved, outside
+from ._solids import Faces, hull_of, inverse, merged, moved, outside
 
 
 def beyond(cover: Sequence[Geometry], points: Matrix) -> NDArray[np.float64]:
@@ -55,6 +55,30 @@ def farthest(
             return max(settled, float(most.max(initial=0.0)))
         edge /= 2
         centers = (centers[open_, None] + halves * edge).reshape(-1, 3)
+
+
+def flaw(vertices: Matrix, faces: Faces, solid: Tree) -> float:
+    """How far the convex hull of a solid sticks out of it at most, metres; infinite where nothing is known.
+
+    Say that each triangle is no more than e below the plane of one of the hull's faces, and that a ball of radius r > e
+    around p lies in the solid. From p to a point x of the hull that is outside, a line leaves the solid somewhere, last
+    at s. Over the plane near s, p has a height of -r or less, s of -e or more and x of 0 or less. So x is at most
+    |s - p| e / (r - e) from s.
+    """
+    planes = hull_of(vertices).equations
+    if solid.info.surface_mode or len(faces) * len(planes) > 2e8:
+        return float("inf")
+    corners = vertices[faces]
+    depth = 0.0
+    for first in range(0, len(corners), 1000):
+        some = corners[first : first + 1000]
+        near = planes[(some.mean(1) @ planes[:, :3].T + planes[:, 3]).argmax(1)]
+        depth = max(depth, -float((np.einsum("nki,ni->nk", some, near[:, :3]) + near[:, 3:]).min()))
+    middle = vertices.mean(0)
+    inner = -float(signed_distance(solid, middle[None]).upper[0])
+    if inner <= depth:
+        return float("inf")
+    return float(np.linalg.norm(vertices - middle, axis=1).max()) * depth / (inner - depth)
 
 
 def mean_distance(cover: Sequence[Geometry], solid: Tree, threads: int = 0, samples: int = 4000) -> float:

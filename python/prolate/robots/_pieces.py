@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .. import Tree, signed_distance
 from ._fits import around
 from ._model import Matrix
-from ._solids import inverse, moved
+from ._solids import cut, inverse, moved
 
 CELLS = 400  #: of the lattice, about
 
@@ -49,7 +49,7 @@ def _cells(vertices: Matrix, faces: NDArray[np.int64], solid: Tree, threads: int
     vertices = moved(inverse(pose), vertices)
     low, high = vertices.min(0), vertices.max(0)
     size = np.maximum(high - low, 1e-3 * (high - low).max())
-    counts = np.maximum(np.round(size / (size.prod() / CELLS) ** (1 / 3)), 1).astype(int)
+    counts = _counts(size)
     planes = [low[axis] + size[axis] * np.arange(counts[axis] + 1) / counts[axis] for axis in range(3)]
     corners = np.stack(np.meshgrid(*planes, indexing="ij"), -1)
     # The tree is of vertices in float32; what is outside by less than that rounds is taken for inside.
@@ -66,39 +66,22 @@ def _cells(vertices: Matrix, faces: NDArray[np.int64], solid: Tree, threads: int
     return found
 
 
+def _counts(size: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Of cells along the edges of a box: cells are cubes, about, but none is thinner than what is flat."""
+    edge = float(size.prod() / CELLS) ** (1 / 3)
+    while True:
+        counts: NDArray[np.int64] = np.maximum(np.round(size / edge), 1).astype(np.int64)
+        if counts.prod() <= 1.5 * CELLS:
+            return counts
+        edge *= 1.05
+
+
 def _slabs(triangles: Matrix, axis: int, planes: NDArray[np.float64]) -> Iterator[Matrix]:
     """The triangles (n, 3, 3), cut at the inner planes."""
     for at in planes[1:-1]:
-        part, triangles = _cut(triangles, axis, at)
+        part, triangles = cut(triangles, triangles[:, :, axis] - at)
         yield part
     yield triangles
-
-
-def _cut(triangles: Matrix, axis: int, at: float) -> tuple[Matrix, Matrix]:
-    """What of the triangles is below the plane, and what above; in the plane: both."""
-    height = triangles[:, :, axis] - at
-    below, above = (height <= 0).all(1), (height >= 0).all(1)
-    crossing, height = triangles[~below & ~above], height[~below & ~above]
-    sides = []
-    for sign, whole in ((-1, below), (1, above)):
-        parts = [triangles[whole]]
-        for first in range(3):  # the corner that is alone on its side comes first
-            p, q, r = (crossing[:, (first + i) % 3] for i in range(3))
-            hp, hq, hr = (sign * height[:, (first + i) % 3] for i in range(3))
-            alone, other = (hp > 0) & (hq <= 0) & (hr <= 0), (hp <= 0) & (hq > 0) & (hr > 0)
-            pq, pr = _between(p, q, hp, hq, axis, at), _between(p, r, hp, hr, axis, at)
-            parts.append(np.stack([p, pq, pr], 1)[alone])
-            parts += [np.stack([pq, q, r], 1)[other], np.stack([pq, r, pr], 1)[other]]
-        sides.append(np.concatenate(parts))
-    return sides[0], sides[1]
-
-
-def _between(p: Matrix, q: Matrix, hp: NDArray[np.float64], hq: NDArray[np.float64], axis: int, at: float) -> Matrix:
-    """Where the edges cross the plane."""
-    apart = np.where(hp == hq, 1.0, hp - hq)
-    found = p + (q - p) * np.clip(hp / apart, 0, 1)[:, None]
-    found[:, axis] = at
-    return found
 
 
 def _joined(cells: dict[_Cell, Matrix]) -> Iterator[tuple[int, int]]:

@@ -161,6 +161,33 @@ def hull_triangles(points: Matrix) -> Triangles:
     return corners, faces.astype(np.int64)
 
 
+def cut(triangles: Matrix, height: Matrix) -> tuple[Matrix, Matrix]:
+    """What of triangles (n, 3, 3) is below a plane, and what above, by their corners' heights (n, 3) over it. What lies
+    in the plane is in both."""
+    below, above = (height <= 0).all(1), (height >= 0).all(1)
+    crossing = ~below & ~above
+    parts, height = triangles[crossing], height[crossing]
+    sides = []
+    for sign, whole in ((-1, below), (1, above)):
+        found = [triangles[whole]]
+        for first in range(3):  # the corner that is alone on its side comes first
+            p, q, r = (parts[:, (first + i) % 3] for i in range(3))
+            hp, hq, hr = (sign * height[:, (first + i) % 3] for i in range(3))
+            alone, other = (hp > 0) & (hq <= 0) & (hr <= 0), (hp <= 0) & (hq > 0) & (hr > 0)
+            pq, pr = _between(p, q, hp, hq), _between(p, r, hp, hr)
+            found.append(np.stack([p, pq, pr], 1)[alone])
+            found += [np.stack([pq, q, r], 1)[other], np.stack([pq, r, pr], 1)[other]]
+        sides.append(np.concatenate(found))
+    return sides[0], sides[1]
+
+
+def _between(p: Matrix, q: Matrix, hp: Matrix, hq: Matrix) -> Matrix:
+    """Where edges cross the plane."""
+    apart = np.where(hp == hq, 1.0, hp - hq)
+    found: Matrix = p + (q - p) * np.clip(hp / apart, 0, 1)[:, None]
+    return found
+
+
 def is_flat(points: Matrix) -> bool:
     """Have the points no hull with a volume?"""
     try:
