@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
+#include <span>
 
 using namespace prolate;
 using namespace prolate::capi;
@@ -40,9 +42,9 @@ std::span<const BodyPair> pairs_of(const prolate_body_pair* pairs, size_t count)
     return {reinterpret_cast<const BodyPair*>(pairs), count};
 }
 
-// Answers of some questions at a time, in room of our own: ask(first, span) fills the span.
+// Answers of some questions at a time, in room of our own: ask(first, count, span) fills the span.
+constexpr size_t kAtOnce = 64;
 template <class Answer, class Ask, class Take> prolate_status by_parts(size_t count, Ask&& ask, Take&& take) {
-    constexpr size_t kAtOnce = 64;
     Answer some[kAtOnce];
     for (size_t i = 0; i < count; i += kAtOnce) {
         const size_t now = std::min(kAtOnce, count - i);
@@ -51,6 +53,20 @@ template <class Answer, class Ask, class Take> prolate_status by_parts(size_t co
         for (size_t k = 0; k < now; ++k) take(i + k, some[k]);
     }
     return PROLATE_OK;
+}
+
+// None of a half-space, of which overlap() does not ask.
+std::optional<Probe> probe_of(const prolate_shape& shape) {
+    switch (shape.kind) {
+    case PROLATE_SPHERE:
+        return Sphere{same<Vec3>(shape.a), shape.radius};
+    case PROLATE_CAPSULE:
+        return Capsule{same<Vec3>(shape.a), same<Vec3>(shape.b), shape.radius};
+    case PROLATE_BOX:
+        return Box{{same<Vec3>(shape.a), same<Quat>(shape.rotation)}, same<Vec3>(shape.half)};
+    default:
+        return std::nullopt;
+    }
 }
 
 static_assert(sizeof(prolate_pair_contacts) == sizeof(PairContacts) &&
@@ -146,31 +162,24 @@ prolate_status prolate_world_raycast(const prolate_world* world, const prolate_r
         });
 }
 
-prolate_status prolate_world_overlap(const prolate_world* world, const prolate_shape* shape, uint32_t mask,
-                                     const prolate_workers* workers, const prolate_query_options* options,
-                                     prolate_body_id* ids, size_t capacity, size_t* found) {
+prolate_status prolate_world_overlap(const prolate_world* world, const prolate_shape* shapes, size_t count,
+                                     uint32_t mask, const prolate_workers* workers,
+                                     const prolate_query_options* options, prolate_body_id* ids, size_t most,
+                                     uint32_t* found) {
     const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
-    if (shape == nullptr || found == nullptr || (ids == nullptr && capacity > 0)) return PROLATE_BAD_ARGUMENT;
-    Probe probe;
-    switch (shape->kind) {
-    case PROLATE_SPHERE:
-        probe = Sphere{same<Vec3>(shape->a), shape->radius};
-        break;
-    case PROLATE_CAPSULE:
-        probe = Capsule{same<Vec3>(shape->a), same<Vec3>(shape->b), shape->radius};
-        break;
-    case PROLATE_BOX:
-        probe = Box{{same<Vec3>(shape->a), same<Quat>(shape->rotation)}, same<Vec3>(shape->half)};
-        break;
-    default:
+    if (!sound(shapes, count, found) || (ids == nullptr && most > 0)) return PROLATE_BAD_ARGUMENT;
+    if (!std::all_of(shapes, shapes + count, [](const prolate_shape& s) { return probe_of(s).has_value(); }))
         return PROLATE_BAD_OPTIONS;
-    }
-    uint32_t count = 0;
-    const auto done = overlap(*world->world, {&probe, 1}, {reinterpret_cast<BodyId*>(ids), capacity}, {&count, 1},
-                              call.workers, options_of(call.given), mask);
-    if (done) *found = count;
-    return status_of(done);
+    return by_parts<uint32_t>(
+        count,
+        [&](size_t first, size_t now, std::span<uint32_t> out) {
+            Probe probes[kAtOnce];
+            for (size_t i = 0; i < now; ++i) probes[i] = *probe_of(shapes[first + i]);
+            return overlap(*world->world, {probes, now}, {reinterpret_cast<BodyId*>(ids) + first * most, now * most},
+                           out, call.workers, options_of(call.given), mask);
+        },
+        [&](size_t i, uint32_t number) { found[i] = number; });
 }
 
 prolate_status prolate_world_sweep(const prolate_world* world, const prolate_tree* tree, prolate_motion motion,

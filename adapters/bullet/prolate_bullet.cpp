@@ -14,6 +14,7 @@
 #include <BulletCollision/CollisionShapes/btShapeHull.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btAabbUtil2.h>
 
 #include <algorithm>
@@ -101,16 +102,11 @@ public:
             if (m != nullptr) m_dispatcher->releaseManifold(m);
     }
 
-    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
-                          btManifoldResult*) override {
+    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                          const btDispatcherInfo& info, btManifoldResult*) override {
         const bool plane_a = is_plane(a), plane_b = is_plane(b);
-        // Between trees, every pair of triangles within the margin is looked at: a fifth of what Bullet keeps is
-        // enough.
-        btScalar margin = 0.2f * gContactBreakingThreshold;
-        if (plane_a || plane_b)
-            margin = gContactBreakingThreshold + (plane_a ? b : a)->getCollisionShape()->getMargin();
         prolate::QueryOptions options;
-        options.margin = static_cast<float>(margin);
+        options.margin = static_cast<float>(margin(*a, *b, info.m_timeStep));
         prolate::ContactManifolds& found = state_->manifolds;
         take_impulses();
         if (plane_a || plane_b) {
@@ -140,6 +136,24 @@ private:
         Pose pose;
     };
 
+    // As far as the bodies may come in a step, within what their shapes allow. At rest, a fifth of what Bullet keeps is
+    // enough: every pair of triangles within the margin is looked at.
+    static btScalar margin(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b, btScalar time) {
+        btVector3 velocity(0, 0, 0);
+        btScalar turning = 0, most = 0;
+        for (const btCollisionObjectWrapper* body : {&a, &b}) {
+            const btCollisionShape& shape = *body->getCollisionShape();
+            if (shape.getShapeType() == CUSTOM_CONCAVE_SHAPE_TYPE) most += shape.getMargin();
+            const btRigidBody* const rigid = btRigidBody::upcast(body->getCollisionObject());
+            if (rigid == nullptr || is_plane(body)) continue;
+            velocity = rigid->getLinearVelocity() - velocity;
+            btVector3 middle;
+            btScalar radius;
+            shape.getBoundingSphere(middle, radius);
+            turning += rigid->getAngularVelocity().length() * (middle.length() + radius);
+        }
+        return 0.2f * gContactBreakingThreshold + btMin(time * (velocity.length() + turning), most);
+    }
     static bool is_plane(const btCollisionObjectWrapper* body) {
         return body->getCollisionShape()->getShapeType() == STATIC_PLANE_PROXYTYPE;
     }

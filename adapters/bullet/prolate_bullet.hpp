@@ -38,8 +38,8 @@ public:
     /// A tree cannot be scaled: bake it at the size that it has.
     void setLocalScaling(const btVector3& scaling) override;
     const btVector3& getLocalScaling() const override { return scaling_; }
-    /// Contacts with a plane are made this far ahead, metres, beyond Bullet's gContactBreakingThreshold, so that what
-    /// is fast does not sink in: let it be the way of a fast body in a step. It does not round the shape.
+    /// Contacts are made at most this far ahead, metres, if the bodies are fast enough to meet in the step, so that
+    /// they do not sink in: let it be the way of a fast body in a step. It does not round the shape.
     void setMargin(btScalar margin) override { margin_ = margin; }
     btScalar getMargin() const override { return margin_; }
     const char* getName() const override { return "ProlateTree"; }

@@ -525,11 +525,13 @@ typedef struct prolate_ray_hit {
 PROLATE_API prolate_status prolate_world_raycast(const prolate_world* world, const prolate_ray* rays, size_t count,
                                                  uint32_t mask, const prolate_workers* workers,
                                                  const prolate_query_options* options, prolate_ray_hit* hits);
-/** world_queries.hpp: overlap() with one sphere, capsule or box. *found is their number; the lowest `capacity` of the
- * ids are written. */
-PROLATE_API prolate_status prolate_world_overlap(const prolate_world* world, const prolate_shape* shape, uint32_t mask,
-                                                 const prolate_workers* workers, const prolate_query_options* options,
-                                                 prolate_body_id* ids, size_t capacity, size_t* found);
+/** world_queries.hpp: overlap() with `count` spheres, capsules and boxes. found[i] is the number of bodies that meet
+ * shapes[i], or may; ids[i * most] and following are theirs, in ascending order of index: `most` of them, the lowest,
+ * if there are more. */
+PROLATE_API prolate_status prolate_world_overlap(const prolate_world* world, const prolate_shape* shapes, size_t count,
+                                                 uint32_t mask, const prolate_workers* workers,
+                                                 const prolate_query_options* options, prolate_body_id* ids,
+                                                 size_t most, uint32_t* found);
 /** world_queries.hpp: sweep() of one tree, from outside. *body is what it hits first, if anything. */
 PROLATE_API prolate_status prolate_world_sweep(const prolate_world* world, const prolate_tree* tree,
                                                prolate_motion motion, uint32_t mask, const prolate_workers* workers,

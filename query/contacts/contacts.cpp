@@ -229,8 +229,9 @@ private:
     bool resolves_all(const Group& one, const Group& other) const {
         const dvec3& n = one.way.normal;
         const double depth = one.way.depth + kSlack * std::abs(one.way.depth);
-        return std::all_of(other.patch->begin(), other.patch->end(),
-                           [&](const Candidate& c) { return pairs_.resolves(n, depth, c.pair); }) &&
+        const Candidate* all[Patch::kSieve];
+        return std::all_of(all, all + other.patch->kept(all),
+                           [&](const Candidate* c) { return pairs_.resolves(n, depth, c->pair); }) &&
                (other.deepest.empty() || glm::dot(n, other.way.normal) * other.deepest.depth() <= depth + same_point());
     }
 

@@ -9,48 +9,46 @@ namespace {
 
 constexpr double kNormalOfPoint = 0.8; // cosine: normals of a point in two queries, if it is the same
 
-uint32_t points_of(const Manifold& manifold) {
-    return std::min(manifold.count, kManifoldPoints);
-}
-
 } // namespace
 
 LastContacts::LastContacts(const ContactManifolds& last, bool exchanged, const RelativePose& to_world) noexcept
-    : last_(last), count_(std::min(last.count, kManifolds)) {
+    : count_(std::min(last.count, kManifolds)) {
     for (uint32_t i = 0; i < count_; ++i) {
-        const Vec3& n = last.manifolds[i].normal;
-        const glm::dvec3 here = glm::dvec3(n.x, n.y, n.z) * to_world.rotation; // the transpose times it
-        normals_[i] = exchanged ? -here : here;
-        for (uint32_t k = 0; k < points_of(last.manifolds[i]); ++k) {
-            const ContactPoint& p = last.manifolds[i].points[k];
+        const Manifold& manifold = last.manifolds[i];
+        const glm::dvec3 here = to_double(manifold.normal) * to_world.rotation; // the transpose times it
+        normals_[i] = {exchanged ? -here : here, manifold.normal};
+        for (uint32_t k = 0; k < std::min(manifold.count, kManifoldPoints); ++k) {
+            const ContactPoint& p = manifold.points[k];
             const glm::dvec3 middle = 0.5 * (to_double(p.point_a) + to_double(p.point_b));
-            points_[point_count_++] = (middle - to_world.translation) * to_world.rotation;
+            points_[point_count_++] = {(middle - to_world.translation) * to_world.rotation,
+                                       p.id,
+                                       i,
+                                       p.age,
+                                       {p.impulse[0], p.impulse[1], p.impulse[2]}};
         }
     }
 }
 
 bool LastContacts::knows(uint64_t id, const glm::dvec3& normal) const noexcept {
-    bool known = false;
-    for (uint32_t i = 0; i < count_; ++i) {
-        const Manifold& m = last_.manifolds[i];
-        const bool alike = glm::dot(normals_[i], normal) > kNormalOfPoint;
-        for (uint32_t k = 0; k < points_of(m) && alike; ++k) known = known || m.points[k].id == id;
-    }
-    return known;
+    return std::any_of(points_, points_ + point_count_, [&](const Point& p) {
+        return p.id == id && glm::dot(normals_[p.manifold].here, normal) > kNormalOfPoint;
+    });
 }
 
 void LastContacts::hand_on(Manifold& manifold) const noexcept {
-    const auto alike = [](const Vec3& a, const Vec3& b) { return a.x * b.x + a.y * b.y + a.z * b.z > kNormalOfPoint; };
-    for (uint32_t i = 0; i < manifold.count; ++i) {
-        ContactPoint& p = manifold.points[i];
-        for (uint32_t j = 0; j < count_; ++j) {
-            const Manifold& m = last_.manifolds[j];
-            if (!alike(m.normal, manifold.normal)) continue;
-            for (uint32_t k = 0; k < points_of(m); ++k) {
-                if (m.points[k].id != p.id) continue;
-                p.age = m.points[k].age + 1;
-                std::copy_n(m.points[k].impulse, 3, p.impulse);
-            }
+    const Vec3& n = manifold.normal;
+    bool alike[kManifolds];
+    for (uint32_t i = 0; i < count_; ++i) {
+        const Vec3& m = normals_[i].given;
+        alike[i] = m.x * n.x + m.y * n.y + m.z * n.z > kNormalOfPoint;
+    }
+    for (uint32_t k = 0; k < manifold.count; ++k) {
+        ContactPoint& to = manifold.points[k];
+        for (uint32_t i = 0; i < point_count_; ++i) {
+            const Point& p = points_[i];
+            if (p.id != to.id || !alike[p.manifold]) continue;
+            to.age = p.age + 1;
+            std::copy_n(p.impulse, 3, to.impulse);
         }
     }
 }

@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -42,12 +43,27 @@ void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, 
     const double values[] = {candidate.depth,     x,  y,  kDiagonal * (x + y),
                              kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y),
                              kDiagonal * (y - x)};
+    uint32_t better = 0, others = 0; // bits of best_; of kept_, those that stay
     for (uint32_t i = 0; i < kSieve; ++i) {
         const double same = i == 0 ? std::min(same_point, kSameDepth * std::abs(candidate.depth)) : same_point;
-        if (any_ && !instead(sieve_[i], candidate, values[i] - reach_[i], same)) continue;
-        reach_[i] = values[i], sieve_[i] = candidate;
+        if (any_ && !instead(kept_[best_[i]], candidate, values[i] - reach_[i], same))
+            others |= 1u << best_[i];
+        else
+            better |= 1u << i, reach_[i] = values[i];
     }
+    if (better == 0) return;
+    const auto place = static_cast<uint8_t>(std::countr_one(others)); // there is one, for `better` has one
+    kept_[place] = candidate;
+    for (uint32_t i = 0; i < kSieve; ++i)
+        if ((better >> i & 1) != 0) best_[i] = place;
     any_ = true;
+}
+
+uint32_t Patch::kept(const Candidate* (&out)[kSieve]) const noexcept {
+    uint32_t count = 0, seen = 0;
+    for (const uint8_t place : best_)
+        if ((seen >> place & 1) == 0) seen |= 1u << place, out[count++] = &kept_[place];
+    return count;
 }
 
 dvec3 Patch::normal() const noexcept {
@@ -61,11 +77,14 @@ bool Patch::mixed() const noexcept {
 
 uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) const noexcept {
     const dvec3 n = normal();
+    const Candidate* all[kSieve];
+    const uint32_t all_count = kept(all);
     uint32_t count = 0;
     // Takes the point that `measure` rates best, if above `least`.
     const auto take = [&](double least, auto&& measure) {
         const Candidate* best = nullptr;
-        for (const Candidate& c : sieve_) {
+        for (uint32_t i = 0; i < all_count; ++i) {
+            const Candidate& c = *all[i];
             const double value = measure(c) * (c.known ? kPreferKnown : 1);
             const auto same = [&](const Candidate& other) { return other.id == c.id; };
             if (value > least && std::none_of(out, out + count, same)) least = value, best = &c;
@@ -75,10 +94,10 @@ uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) con
     };
     // Of what is as deep as the deepest, the outermost: with equal depths a corner, not what lies between two.
     dvec3 mean(0);
-    for (const Candidate& c : sieve_) mean += c.middle / double{kSieve};
-    const double as_deep = sieve_[0].depth - std::min(same_point, kSameDepth * std::abs(sieve_[0].depth));
+    for (const uint8_t place : best_) mean += kept_[place].middle / double{kSieve};
+    const double as_deep = depth() - std::min(same_point, kSameDepth * std::abs(depth()));
     const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
-    if (!take(-0.5, outermost)) out[count++] = sieve_[0];
+    if (!take(-0.5, outermost)) out[count++] = deepest();
     const dvec3 p = out[0].middle;
     if (!take(same_point, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
     const dvec3 q = out[1].middle;

@@ -23,11 +23,11 @@
 namespace prolate::query {
 
 struct Candidate {
-    glm::dvec3 middle{0, 0, 0}; // between the surfaces
-    double depth = 0;
-    uint64_t id = 0;
-    bool known = false;         // of the last query
-    glm::dvec3 normal{0, 0, 1}; // of the pair
+    glm::dvec3 middle; // between the surfaces
+    double depth;
+    uint64_t id;
+    bool known;        // of the last query
+    glm::dvec3 normal; // of the pair
     MeetingPair pair;
 };
 
@@ -75,10 +75,11 @@ public:
         return within(x_) && within(y_);
     }
     bool empty() const noexcept { return !any_; }
-    double depth() const noexcept { return any_ ? sieve_[0].depth : -1e300; } ///< of the deepest point
+    double depth() const noexcept { return any_ ? deepest().depth : -1e300; } ///< of the deepest point
     double overlap() const noexcept { return overlap_; }                      ///< the largest
-    const Candidate* begin() const noexcept { return sieve_; } ///< those that stand for all, if there are any
-    const Candidate* end() const noexcept { return sieve_ + kSieve; }
+    const Candidate& deepest() const noexcept { return kept_[best_[0]]; }     ///< if there are points
+    /// Those that stand for all, if there are any, each once: the deepest first. Returns how many.
+    uint32_t kept(const Candidate* (&out)[kSieve]) const noexcept;
     glm::dvec3 normal() const noexcept; ///< the mean
     /// Is the mean one of different normals?
     bool mixed() const noexcept;
@@ -91,8 +92,9 @@ private:
     static constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
     double weight_ = 0;
-    Candidate sieve_[kSieve];
-    double reach_[kSieve]; // what each is the best for: depth, or coordinate
+    Candidate kept_[kSieve]; // each once, for what it is the best for is often several things
+    uint8_t best_[kSieve];   // of kept_: the deepest, and the farthest in each direction
+    double reach_[kSieve];   // their depth, or coordinate
     double overlap_ = -1e300;
     bool any_ = false;
 };

@@ -184,7 +184,7 @@ double PairContacts::overlap(const dvec3& n, uint32_t& vertex_a, uint32_t& verte
 // pattern of directions (Hooke and Jeeves 1961, with the step of Powell 1964).
 dvec3 PairContacts::shortest_way(const Patch& patch) const noexcept {
     const dvec3 mean = patch.normal();
-    const MeetingPair& pair = patch.begin()->pair;
+    const MeetingPair& pair = patch.deepest().pair;
     if (!patch.mixed() || pair.triangle_a == kNoTriangle || pair.triangle_b == kNoTriangle) return mean;
     const Surrounded a = surrounded_a(pair.triangle_a), b = surrounded_b(pair.triangle_b);
     dvec3 best = mean;
@@ -231,7 +231,10 @@ DeepestContacts PairContacts::deepest(const Patch& patch, const dvec3& n) noexce
             seen[count++] = climb.vertex;
             add_depth_of(climb.vertex, of_a, pair, n, patch.overlap(), out);
         };
-        for (const Candidate& c : patch) {
+        const Candidate* all[Patch::kSieve];
+        const uint32_t all_count = patch.kept(all);
+        for (uint32_t i = 0; i < all_count; ++i) {
+            const Candidate& c = *all[i];
             if (c.pair.triangle_a == kNoTriangle || c.pair.triangle_b == kNoTriangle) continue;
             look(c.pair, n);
             if (!(glm::dot(c.normal, n) > kSameAsFace)) look(c.pair, c.normal); // in a hollow of faces

@@ -20,6 +20,14 @@ dmat3 factor_of(const Ellipsoid& e) {
     return {{e.l11, e.l21, e.l31}, {0, e.l22, e.l32}, {0, 0, e.l33}}; // columns
 }
 
+RelativePose finite_or_nan(const RelativePose& pose) {
+    const dmat3& r = pose.rotation;
+    const dvec3& t = pose.translation;
+    if (std::isfinite(r[0][0] + r[1][1] + r[2][2] + t.x + t.y + t.z + pose.distance)) return pose;
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    return {dmat3(dvec3(nan), dvec3(nan), dvec3(nan)), dvec3(nan), nan};
+}
+
 } // namespace
 
 // Squares and products of floats are exact in double.
@@ -34,15 +42,12 @@ dmat3 rotation_matrix(const Quat& q) noexcept {
 RelativePose relative_pose(const Pose& a, const Pose& b) noexcept {
     const dmat3 rotation_a = rotation_matrix(a.rotation), rotation_b = rotation_matrix(b.rotation);
     const dvec3 d = to_double(b.translation) - to_double(a.translation);
-    RelativePose out{glm::transpose(rotation_a) * rotation_b, d * rotation_a, glm::length(d)};
-    const dmat3& r = out.rotation;
-    const double sum =
-        r[0][0] + r[1][1] + r[2][2] + out.translation.x + out.translation.y + out.translation.z + out.distance;
-    if (!std::isfinite(sum)) {
-        const double nan = std::numeric_limits<double>::quiet_NaN();
-        out = {dmat3(dvec3(nan), dvec3(nan), dvec3(nan)), dvec3(nan), nan};
-    }
-    return out;
+    return finite_or_nan({glm::transpose(rotation_a) * rotation_b, d * rotation_a, glm::length(d)});
+}
+
+RelativePose world_pose(const Pose& pose) noexcept {
+    const dvec3 t = to_double(pose.translation);
+    return finite_or_nan({rotation_matrix(pose.rotation), t, glm::length(t)});
 }
 
 RelativePose inverse(const RelativePose& pose) noexcept {

@@ -27,6 +27,8 @@ struct RelativePose {
     double distance; // |t2 - t1|
 };
 RelativePose relative_pose(const Pose& a, const Pose& b) noexcept;
+/// As seen from the world's frame: relative_pose(Pose{}, pose), sooner.
+RelativePose world_pose(const Pose& pose) noexcept;
 /// Body A as seen from body B's frame. The translation is rounded three times more, by 3 u |d| in all.
 RelativePose inverse(const RelativePose& pose) noexcept;
 

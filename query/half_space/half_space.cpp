@@ -4,7 +4,7 @@
 //
 // Of contacts, a node is passed over if nothing in it could take a place in the manifold's sieve: the sieve keeps what
 // is deepest, and outermost in eight directions (query/contacts/manifold.hpp). So a flat bottom of a thousand triangles
-// costs little more than one of ten.
+// costs little more than one of ten. Of a body of few corners, all are looked at, without the tree.
 #include <prolate/half_space.hpp>
 
 #include "query/contacts/last_contacts.hpp"
@@ -32,7 +32,8 @@ PlacedHalfSpace moved(PlacedHalfSpace h, double margin) {
     return h;
 }
 
-constexpr double kSamePoint = 1e-4; // of the body: what is nearer is one point
+constexpr double kSamePoint = 1e-4;  // of the body: what is nearer is one point
+constexpr uint32_t kFewCorners = 64; // all of which cost less than the blocks of nodes above them
 
 // All corners and ellipsoids that touch, sieved.
 class Touching {
@@ -60,6 +61,36 @@ public:
     uint64_t found = 0;
     bool meets = false;
 
+    /// All of them, if the body is a mesh of few corners: in the order of its triangles. False, and nothing is done, if
+    /// it is not, the budget does not suffice, or rounding leaves open which corners touch.
+    bool take_all() {
+        const TreeView& tree = s_.side.tree;
+        const uint32_t corners = tree.vertex_count(), triangles = tree.triangle_count();
+        if (corners == 0 || corners > kFewCorners || triangles > 2 * kFewCorners || s_.side.limit_from != UINT32_MAX ||
+            triangles > s_.left())
+            return false;
+        dvec3 at[kFewCorners];
+        double over[kFewCorners], farthest = 0;
+        for (uint32_t v = 0; v < corners; ++v) {
+            at[v] = position(tree, v), over[v] = height(at[v], touched_);
+            farthest = std::max(farthest, glm::dot(at[v], at[v]));
+        }
+        // A triangle touches if a corner is no higher than kSeparationMargin (reach of the triangle, and of the plane).
+        const double surely = kSeparationMargin * touched_.reach,
+                     perhaps = kSeparationMargin * (2 * std::sqrt(farthest) + touched_.reach);
+        const auto open = [&](double height) { return height > surely && height <= perhaps; };
+        if (std::any_of(over, over + corners, open)) return false;
+        s_.stats.triangle_tests += triangles;
+        uint64_t seen = 0;
+        for (uint32_t t = 0; t < triangles; ++t)
+            for (const uint32_t v : tree.triangle(t)) {
+                if ((seen >> v & 1) != 0) continue;
+                seen |= uint64_t{1} << v;
+                if (over[v] <= surely) add(at[v], {Part::Kind::vertex, v, 0});
+            }
+        return true;
+    }
+
 private:
     bool leaf(uint32_t slot) {
         const TreeView& tree = s_.side.tree;
@@ -68,8 +99,7 @@ private:
         s_.stats.triangle_tests += std::max(range.count, 1u);
         if (range.count == 0) {
             const PlacedEllipsoid e = place(tree.bound(slot), tree.scale());
-            if (!separated(e, touched_))
-                add(lowest_point(e, s_.shape.normal), {Part::Kind::node, slot, 0}, slot, kNoTriangle);
+            if (!separated(e, touched_)) add(lowest_point(e, s_.shape.normal), {Part::Kind::node, slot, 0});
         }
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             const PlacedTriangle triangle = place(tree, t);
@@ -80,12 +110,12 @@ private:
                 if (uint32_t& seen = seen_[corners[k] % std::size(seen_)];
                     seen != corners[k] && height(triangle.corner[k], touched_) <= rounding) {
                     seen = corners[k];
-                    add(triangle.corner[k], {Part::Kind::vertex, corners[k], 0}, slot, t);
+                    add(triangle.corner[k], {Part::Kind::vertex, corners[k], 0});
                 }
         }
         return true;
     }
-    void add(const dvec3& p, const Part& part, uint32_t slot, uint32_t triangle) {
+    void add(const dvec3& p, const Part& part) {
         const double depth = -height(p, s_.shape);
         const uint64_t id = id_of(part, {Part::Kind::face, 0, 0});
         const dvec3 n = -s_.shape.normal;
@@ -96,7 +126,7 @@ private:
                    .id = id,
                    .known = last_.knows(id, n),
                    .normal = n,
-                   .pair = {slot, 0, triangle, kNoTriangle}},
+                   .pair = {}},
                   1, depth, same_point);
     }
     bool wanted(uint32_t slot, double bound) const {
@@ -120,7 +150,8 @@ namespace {
 DistanceResult of_core(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, Scratch context,
                        const DistanceOptions& options) {
     DistanceResult out;
-    const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
+    const query::RelativePose to_world = query::world_pose(pose);
+    const query::PlacedHalfSpace shape = query::place(half_space, to_world, 0);
     if (!query::is_finite(shape)) return out;
     query::HeightSearch search(tree, shape, context, {.max_pair_tests = options.max_pair_tests});
     search.limit = query::sound_length(options.max_distance);
@@ -136,7 +167,6 @@ DistanceResult of_core(const TreeView& tree, const Pose& pose, const HalfSpace& 
         out.verdict = Verdict::overlapping, out.lower = 0;
     else if (out.lower > 0)
         out.verdict = Verdict::separated;
-    const query::RelativePose to_world = query::relative_pose(Pose{}, pose);
     const auto world = [&](const glm::dvec3& p) {
         return query::to_float(to_world.rotation * p + to_world.translation);
     };
@@ -166,10 +196,11 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
                        Scratch context, const QueryOptions& query_options) noexcept {
     QueryOptions options = query::sound(query_options);
     options.margin = query::with_radius(options.margin, tree.radius());
-    const query::PlacedHalfSpace shape = query::place(half_space, pose, 0);
-    const query::RelativePose to_world = query::relative_pose(Pose{}, pose);
+    const query::RelativePose to_world = query::world_pose(pose);
+    const query::PlacedHalfSpace shape = query::place(half_space, to_world, 0);
     const query::LastContacts last(manifolds, false, to_world);
-    manifolds = {};
+    std::fill_n(manifolds.manifolds, std::min(manifolds.count, kManifolds), Manifold{});
+    manifolds.count = 0;
     ContactResult out;
     if (!query::suffices(context, tree)) return out;
     if (!query::is_finite(shape) || !std::isfinite(options.margin)) {
@@ -177,10 +208,12 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
         return out;
     }
     query::HeightSearch search(tree, shape, context, options);
-    search.limit =
-        options.margin + query::kSeparationMargin * (shape.reach + query::place(tree.bound(0), tree.scale()).reach) * 4;
     query::Touching touching(search, options.margin, last);
-    query::traverse(search);
+    if (!touching.take_all()) {
+        const double reach = shape.reach + query::place(tree.root_bound(), tree.scale()).reach;
+        search.limit = options.margin + query::kSeparationMargin * reach * 4;
+        query::traverse(search);
+    }
     out.found = touching.found;
     out.stats = search.stats;
     out.stats.deepest_level = search.side.deepest_level();

@@ -221,10 +221,14 @@ RoundedBox place(const Box& box, const Pose& pose, double margin) noexcept {
 }
 
 PlacedHalfSpace place(const HalfSpace& half_space, const Pose& pose, double margin) noexcept {
-    const RelativePose to_frame = relative_pose(pose, {pose.translation, {}}); // turned only
-    const dvec3 n = to_double(half_space.normal), unit = n / glm::length(n), t = to_double(pose.translation);
+    return place(half_space, world_pose(pose), margin);
+}
+
+PlacedHalfSpace place(const HalfSpace& half_space, const RelativePose& to_world, double margin) noexcept {
+    const dvec3 n = to_double(half_space.normal), unit = n / glm::length(n);
     const double offset = half_space.offset + margin;
-    return {to_frame.rotation * unit, offset - glm::dot(unit, t), std::abs(offset) + glm::length(t)};
+    return {unit * to_world.rotation, // the transpose times it
+            offset - glm::dot(unit, to_world.translation), std::abs(offset) + to_world.distance};
 }
 
 bool separated(const PlacedTriangle& triangle, const RoundedBox& box, double margin) noexcept {

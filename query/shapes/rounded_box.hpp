@@ -48,6 +48,8 @@ struct PlacedHalfSpace {
     double reach;
 };
 PlacedHalfSpace place(const HalfSpace& half_space, const Pose& pose, double margin) noexcept;
+/// `to_world`: from the tree's frame.
+PlacedHalfSpace place(const HalfSpace& half_space, const RelativePose& to_world, double margin) noexcept;
 
 /// True only if they have no common point. The margin is a parameter only so that the tests can show that wrong ones
 /// are caught.

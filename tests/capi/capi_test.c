@@ -396,15 +396,21 @@ static void test_scene(void) {
     CHECK(hits[1].body.index == part.index && hits[2].body.index == ground.index && fabs(hits[2].t - 9) < 1e-6);
     CHECK(hits[3].verdict == PROLATE_SEPARATED && hits[3].body.generation == 0);
 
-    prolate_shape shape;
-    memset(&shape, 0, sizeof shape);
-    shape.a = (prolate_vec3){0, 0, 0.5f}, shape.radius = 1;
-    prolate_body_id met[1];
-    size_t found = 0;
-    CHECK_OK(prolate_world_overlap(world, &shape, UINT32_MAX, &one, NULL, met, 1, &found));
-    CHECK(found == 2 && met[0].index == ground.index);
-    shape.kind = PROLATE_HALF_SPACE;
-    CHECK_STATUS(prolate_world_overlap(world, &shape, UINT32_MAX, &one, NULL, met, 1, &found), PROLATE_BAD_OPTIONS);
+    prolate_shape shapes[70]; // more than are worked on at once
+    memset(shapes, 0, sizeof shapes);
+    for (size_t i = 0; i < 70; ++i) shapes[i].a = (prolate_vec3){0, 0, i % 2 ? 0.5f : 50}, shapes[i].radius = 1;
+    prolate_body_id met[70];
+    uint32_t found[70];
+    memset(met, 0, sizeof met);
+    CHECK_OK(prolate_world_overlap(world, shapes, 70, UINT32_MAX, &one, NULL, met, 1, found));
+    for (size_t i = 0; i < 70; ++i)
+        CHECK(found[i] == (i % 2 ? 2u : 0u) && met[i].generation == (i % 2 ? ground.generation : 0));
+    CHECK(met[69].index == ground.index);
+    CHECK_OK(prolate_world_overlap(world, shapes, 70, UINT32_MAX, &one, NULL, NULL, 0, found));
+    CHECK(found[69] == 2);
+    shapes[69].kind = PROLATE_HALF_SPACE;
+    CHECK_STATUS(prolate_world_overlap(world, shapes, 70, UINT32_MAX, &one, NULL, met, 1, found), PROLATE_BAD_OPTIONS);
+    CHECK_STATUS(prolate_world_overlap(world, NULL, 1, UINT32_MAX, &one, NULL, met, 1, found), PROLATE_BAD_ARGUMENT);
 
     prolate_sweep_result s = PROLATE_INIT(prolate_sweep_result);
     const prolate_motion fall = {{{0, 0, 5}, upright}, {0, 0, -5}, {0, 0, 0}, {0, 0, 0}};

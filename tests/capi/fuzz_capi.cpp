@@ -175,8 +175,8 @@ void query_more(Input& in, const prolate_body& a, const prolate_body& b, Scratch
     prolate_body_id ids[2];
     prolate_shape probe = shape;
     probe.kind %= 3;
-    size_t found = 0;
-    require(prolate_world_overlap(world, &probe, UINT32_MAX, &workers, &options, ids, 2, &found) == PROLATE_OK);
+    uint32_t found = 0;
+    require(prolate_world_overlap(world, &probe, 1, UINT32_MAX, &workers, &options, ids, 2, &found) == PROLATE_OK);
     require(prolate_world_sweep(world, b.tree, motion, UINT32_MAX, &workers, &step, &id, &s) == PROLATE_OK);
     prolate_world_destroy(world);
 }

@@ -10,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -160,6 +161,51 @@ TEST(HalfSpace, WhatLiesFlatSpansItsBottom) {
         EXPECT_NEAR(p.depth, 0.01, 1e-6);
     }
     EXPECT_LT(got.stats.triangle_tests, 3200u / 3); // of 3200 triangles
+}
+
+// A body of few corners is not searched, one of many is: a fine ball inside a box makes no difference to its contacts.
+TEST(HalfSpace, FewCornersTouchAsManyDo) {
+    const Mesh box = shapes::box(1, 2, 0.5f);
+    Mesh filled = box;
+    shapes::append(filled, shapes::moved(shapes::icosphere(2), {0.5f, 1, 0.25f}, 0.05f));
+    const scenes::ExactScene few = scenes::exact_tree(box), many = scenes::exact_tree(filled);
+    ASSERT_LE(few.mesh.vertices.size(), 64u);
+    ASSERT_GT(many.mesh.vertices.size(), 64u);
+    Random random(5);
+    const auto context = std::make_unique<QueryContext>();
+    uint32_t points = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const HalfSpace half_space = ground(random);
+        const Pose pose = scenes::pose_at(random, random.in(0, 2));
+        const QueryOptions options{.margin = i % 2 == 0 ? 0.05f : 0};
+        ContactManifolds a, b;
+        const ContactResult of_few = contacts(*TreeView::open(few.bytes), pose, half_space, a, *context, options);
+        const ContactResult of_many = contacts(*TreeView::open(many.bytes), pose, half_space, b, *context, options);
+        ASSERT_EQ(of_few.verdict, of_many.verdict);
+        ASSERT_EQ(a.count, b.count);
+        if (a.count == 0) continue;
+        const Manifold &m = a.manifolds[0], &n = b.manifolds[0];
+        ASSERT_EQ(m.normal, n.normal);
+        if (of_few.found > 4) continue; // of more, equally good ones may be kept
+        ASSERT_EQ(m.count, n.count);
+        for (uint32_t k = 0; k < m.count; ++k, ++points)
+            EXPECT_TRUE(std::any_of(n.points, n.points + n.count, [&](const ContactPoint& p) {
+                return p.point_a == m.points[k].point_a && p.point_b == m.points[k].point_b &&
+                       p.depth == m.points[k].depth;
+            }));
+    }
+    EXPECT_GT(points, 400u);
+}
+
+TEST(HalfSpace, VerticesWithoutTrianglesDoNotTouch) {
+    Mesh mesh = shapes::box();
+    mesh.vertices.push_back({0.5f, 0.5f, -3});
+    const scenes::ExactScene scene = scenes::exact_tree(mesh);
+    const auto context = std::make_unique<QueryContext>();
+    ContactManifolds manifolds;
+    const TreeView tree = *TreeView::open(scene.bytes);
+    EXPECT_EQ(contacts(tree, {{0, 0, 1}, {}}, {{0, 0, 1}, 0}, manifolds, *context).verdict, Verdict::separated);
+    EXPECT_EQ(contacts(tree, {{0, 0, -0.1f}, {}}, {{0, 0, 1}, 0}, manifolds, *context).found, 4u);
 }
 
 TEST(HalfSpace, PointsKeepTheirAgeAndImpulse) {
