@@ -20,11 +20,15 @@
 // have the same. A file that is read is kept as long as the process runs, and shared between models; if it has changed
 // since, it is read again for the next model.
 //
-// Contacts of trees with each other, with planes, spheres, capsules, ellipsoids, cylinders and boxes are those of
-// contacts(): this library replaces entries of mjCOLLISIONFUNC, and hands what is not its own on to what stood there.
-// So margins and gaps work, and `sdf_iterations` does not matter; `sdf_initpoints` stays the most contacts of a pair
-// (16 are enough). Against meshes, other SDFs and flexes, and for rays, MuJoCo asks for distances and gradients, which
-// come from signed_distance(). Height fields are not served. Threads: as MuJoCo's.
+// This library replaces entries of mjCOLLISIONFUNC, and hands what is not its own on to what stood there. Contacts with
+// planes, spheres, capsules, ellipsoids, cylinders and boxes are those of contacts(). Between trees of closed meshes,
+// they are the corners of either that lie in the other, or within the margin of it, each with the normal of the surface
+// that is nearest to it: so threads that interlock and rings that are linked know the shortest way out at each point,
+// which no manifold of one normal does. Where edges cross, contacts() has points; those that the distances confirm
+// count, too. `sdf_iterations` does not matter; `sdf_initpoints` stays the most contacts of a pair.
+//
+// Against meshes, other SDFs and flexes, and for rays, MuJoCo asks for distances and gradients, which come from
+// signed_distance(). Height fields are not served. Threads: as MuJoCo's.
 #include <prolate/bounds.hpp>
 #include <prolate/contacts.hpp>
 #include <prolate/half_space.hpp>
@@ -152,7 +156,8 @@ prolate::QueryContext& context() {
 
 struct Instance {
     TreeView tree;
-    Frame tree_in_geom; // MuJoCo moves a mesh to its centre of mass and turns it to its principal axes
+    prolate::Bounds box; // in the tree's frame
+    Frame tree_in_geom;  // MuJoCo moves a mesh to its centre of mass and turns it to its principal axes
 };
 
 const Instance* instance_of(const mjData* d, int instance) {
@@ -179,7 +184,7 @@ int init(const mjModel* m, mjData* d, int instance) {
         }
         mesh = other;
     }
-    auto made = std::make_unique<Instance>(Instance{*tree, {}});
+    auto made = std::make_unique<Instance>(Instance{*tree, prolate::bounds(*tree, {}), {}});
     if (mesh >= 0) {
         Frame in_mesh;
         mju_copy3(in_mesh.pos, m->mesh_pos + 3 * mesh), mju_copy4(in_mesh.quat, m->mesh_quat + 4 * mesh);
@@ -264,67 +269,168 @@ const Tree* simple_tree(const mjModel* m, int geom) {
     if (fresh && type == mjGEOM_CAPSULE) take(prolate::capsule_tree({0, 0, -size.y}, {0, 0, size.y}, size.x));
     if (fresh && type == mjGEOM_CYLINDER) take(prolate::cylinder_tree(size.x, size.y));
     if (fresh && type == mjGEOM_BOX) take(prolate::box_tree(size));
-    if (fresh && type == mjGEOM_ELLIPSOID) take(prolate::ellipsoid_tree({.l11 = size.x, .l22 = size.y, .l33 = size.z}));
+    if (fresh && type == mjGEOM_ELLIPSOID)
+        take(prolate::ellipsoid_tree({.center = {}, .l11 = size.x, .l22 = size.y, .l33 = size.z}));
     return tree ? &*tree : nullptr;
 }
 
-struct Body {
-    TreeView tree;
-    Frame frame;
+// A point of contact; the normal points from the first geom to the second, as MuJoCo has it.
+struct Touch {
+    mjtNum dist, pos[3], normal[3];
 };
-std::optional<Body> body_of(const mjModel* m, const mjData* d, int geom) {
-    const Frame frame = frame_of_geom(d, geom);
-    if (m->geom_type[geom] == mjGEOM_SDF) {
-        const Instance& of = *instance_of(d, m->geom_plugin[geom]);
-        return Body{of.tree, frame * of.tree_in_geom};
-    }
-    const Tree* const tree = simple_tree(m, geom);
-    return tree != nullptr ? std::optional<Body>({tree->view(), frame}) : std::nullopt;
-}
 
-// Found in the frame `in`; the deepest manifolds come first. MuJoCo's normals point from the first geom to the second.
-int give(const prolate::ContactManifolds& found, const Frame& in, mjtNum sign, int most, mjPreContact* con) {
-    int count = 0;
+// Those of manifolds, the deepest manifold first.
+void add_manifolds(const prolate::ContactManifolds& found, mjtNum sign, std::vector<Touch>& out) {
     for (uint32_t i = 0; i < found.count; ++i) {
-        const prolate::Manifold& manifold = found.manifolds[i];
-        const mjtNum normal[] = {sign * manifold.normal.x, sign * manifold.normal.y, sign * manifold.normal.z};
-        for (uint32_t k = 0; k < manifold.count && count < most; ++k, ++count) {
-            const prolate::ContactPoint& p = manifold.points[k];
+        const prolate::Manifold& m = found.manifolds[i];
+        for (uint32_t k = 0; k < m.count; ++k) {
+            const prolate::ContactPoint& p = m.points[k];
             const auto middle = [](float a, float b) { return 0.5 * (mjtNum{a} + mjtNum{b}); };
-            const mjtNum at[] = {middle(p.point_a.x, p.point_b.x), middle(p.point_a.y, p.point_b.y),
-                                 middle(p.point_a.z, p.point_b.z)};
-            con[count].dist = -p.depth;
-            mju_trnVecPose(con[count].pos, in.pos, in.quat, at);
-            mju_rotVecQuat(con[count].normal, normal, in.quat);
-            mju_zero3(con[count].tangent);
+            out.push_back(
+                {-p.depth,
+                 {middle(p.point_a.x, p.point_b.x), middle(p.point_a.y, p.point_b.y), middle(p.point_a.z, p.point_b.z)},
+                 {sign * m.normal.x, sign * m.normal.y, sign * m.normal.z}});
         }
     }
-    return count;
 }
 
-// All in the frame of the first tree, so that the distance from the world's origin costs no accuracy.
-int collide(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g2, mjtNum margin) {
-    const bool plane = m->geom_type[g1] == mjGEOM_PLANE;
-    if (!is_ours(m, g2) || (m->geom_type[g1] == mjGEOM_SDF && !is_ours(m, g1)))
-        return others[m->geom_type[g1]][m->geom_type[g2]](m, d, con, g1, g2, margin);
-    const int most = std::min(m->opt.sdf_initpoints, mjMAXCONPAIR);
-    const prolate::QueryOptions options{.margin = static_cast<float>(margin)};
+// The corners of `one` within the margin of `other`, in the frame of `other`. `sign`: of its gradient, for the normal.
+void add_corners(const TreeView& one, const Frame& one_in_other, const Instance& other, mjtNum margin, mjtNum sign,
+                 std::vector<Touch>& out) {
+    constexpr size_t kAtOnce = 64;
+    Vec3 points[kAtOnce];
+    prolate::Verdict sides[kAtOnce];
+    size_t count = 0;
+    // Which side a point is on is soon known; how deep is asked of those inside, and of others as far as it matters.
+    const auto ask = [&] {
+        contains(other.tree, {}, {points, count}, {sides, count}, context());
+        for (size_t i = 0; i < count; ++i) {
+            const bool outside = sides[i] == prolate::Verdict::separated;
+            if (outside && !(margin > 0)) continue;
+            const prolate::PointOptions options{.max_distance = outside ? margin : mjMAXVAL};
+            const prolate::SignedDistance answer = signed_distance(other.tree, {}, points[i], context(), options);
+            const mjtNum dist = value_of(answer);
+            if (!(dist <= margin)) continue;
+            const Vec3 &p = points[i], &g = answer.gradient;
+            out.push_back({dist,
+                           {p.x - 0.5 * dist * g.x, p.y - 0.5 * dist * g.y, p.z - 0.5 * dist * g.z},
+                           {sign * g.x, sign * g.y, sign * g.z}});
+        }
+        count = 0;
+    };
+    const Vec3 &low = other.box.lower, &high = other.box.upper;
+    const auto within = [&](mjtNum x, float from, float to) { return x >= from - margin && x <= to + margin; };
+    for (uint32_t v = 0; v < one.vertex_count(); ++v) {
+        const Vec3 stored = one.vertex(v);
+        const mjtNum scale = one.scale(), corner[] = {scale * stored.x, scale * stored.y, scale * stored.z};
+        mjtNum p[3];
+        mju_trnVecPose(p, one_in_other.pos, one_in_other.quat, corner);
+        if (!within(p[0], low.x, high.x) || !within(p[1], low.y, high.y) || !within(p[2], low.z, high.z)) continue;
+        points[count++] = to_prolate(p);
+        if (count == kAtOnce) ask();
+    }
+    ask();
+}
+
+// Is the second body as deep in the first one as a manifold says, and farther and farther out of it if it is moved on
+// along the normal? If that is not the shortest way out, it is not.
+bool confirms(const Instance& first, const Touch& touch) {
+    constexpr mjtNum kStep = 1e-3, kRises = 0.7, kSame = 0.2; // of the size; of the step; of the depth
+    const Vec3 &low = first.box.lower, &high = first.box.upper;
+    const mjtNum step = kStep * std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+    const auto after = [&](mjtNum way) { // of the second body's point there; `pos` is half-way
+        mjtNum p[3];
+        mju_addScl3(p, touch.pos, touch.normal, 0.5 * touch.dist + way);
+        return value_of(signed_distance(first.tree, {}, to_prolate(p), context()));
+    };
+    return std::abs(after(0) - touch.dist) <= kSame * (std::abs(touch.dist) + step) &&
+           after(step - touch.dist) >= kRises * step;
+}
+
+// The deepest, then always the one that is farthest from those that are taken.
+void thin_out(std::vector<Touch>& touches, size_t most) {
+    if (touches.size() <= most) return;
+    const auto nearest_first = [](const Touch& a, const Touch& b) { return a.dist < b.dist; };
+    std::iter_swap(touches.begin(), std::min_element(touches.begin(), touches.end(), nearest_first));
+    std::vector<mjtNum> apart(touches.size(), mjMAXVAL);
+    for (size_t taken = 1; taken < most; ++taken) {
+        size_t next = taken;
+        for (size_t i = taken; i < touches.size(); ++i) {
+            apart[i] = std::min(apart[i], mju_dist3(touches[i].pos, touches[taken - 1].pos));
+            if (apart[i] > apart[next]) next = i;
+        }
+        std::swap(touches[taken], touches[next]), std::swap(apart[taken], apart[next]);
+    }
+    touches.resize(most);
+}
+
+// From the frame `in` to the world.
+int give(const std::vector<Touch>& touches, const Frame& in, mjPreContact* con) {
+    for (const Touch& touch : touches) {
+        con->dist = touch.dist;
+        mju_trnVecPose(con->pos, in.pos, in.quat, touch.pos);
+        mju_rotVecQuat(con->normal, touch.normal, in.quat);
+        mju_zero3(con->tangent);
+        ++con;
+    }
+    return static_cast<int>(touches.size());
+}
+
+bool is_closed_mesh(const TreeView& tree) {
+    return tree.has_triangles() && !tree.surface_mode();
+}
+
+// Two trees of ours; in the frame of the first.
+void add_pair(const Instance& a, const Instance& b, const Frame& b_in_a, float margin, std::vector<Touch>& out) {
+    const bool closed = is_closed_mesh(a.tree) && is_closed_mesh(b.tree);
+    if (closed) {
+        add_corners(b.tree, b_in_a, a, margin, 1, out);
+        const size_t first_in_b = out.size();
+        add_corners(a.tree, inverse(b_in_a), b, margin, -1, out);
+        for (size_t i = first_in_b; i < out.size(); ++i) {
+            const Touch in_b = out[i];
+            mju_trnVecPose(out[i].pos, b_in_a.pos, b_in_a.quat, in_b.pos);
+            mju_rotVecQuat(out[i].normal, in_b.normal, b_in_a.quat);
+        }
+    }
+    if (!out.empty()) return;
     prolate::ContactManifolds found;
-    const auto body = body_of(m, d, g2);
-    if (!body) return 0;
-    if (plane) {
-        const Frame ground = inverse(body->frame) * frame_of_geom(d, g1);
+    contacts(a.tree, {}, b.tree, to_prolate(b_in_a), found, context(), {.margin = margin});
+    add_manifolds(found, 1, out);
+    if (closed)
+        out.erase(std::remove_if(out.begin(), out.end(), [&](const Touch& t) { return !confirms(a, t); }), out.end());
+}
+
+// All in the frame of one of the trees, so that the distance from the world's origin costs no accuracy.
+int collide(const mjModel* m, mjData* d, mjPreContact* con, int g1, int g2, mjtNum margin) {
+    const int type = m->geom_type[g1];
+    if (!is_ours(m, g2) || (type == mjGEOM_SDF && !is_ours(m, g1)))
+        return others[type][m->geom_type[g2]](m, d, con, g1, g2, margin);
+    const Instance& b = *instance_of(d, m->geom_plugin[g2]);
+    const Frame in_b = frame_of_geom(d, g2) * b.tree_in_geom, frame = frame_of_geom(d, g1);
+    const prolate::QueryOptions options{.margin = static_cast<float>(margin)};
+    static thread_local std::vector<Touch> touches;
+    touches.clear();
+    Frame in = in_b;
+    prolate::ContactManifolds found;
+    if (type == mjGEOM_SDF) {
+        const Instance& a = *instance_of(d, m->geom_plugin[g1]);
+        in = frame * a.tree_in_geom;
+        add_pair(a, b, inverse(in) * in_b, options.margin, touches);
+    } else if (type == mjGEOM_PLANE) {
+        const Frame ground = inverse(in_b) * frame;
         const mjtNum up[] = {0, 0, 1};
         mjtNum normal[3];
         mju_rotVecQuat(normal, up, ground.quat);
         const prolate::HalfSpace half_space{to_prolate(normal), static_cast<float>(mju_dot3(normal, ground.pos))};
-        contacts(body->tree, {}, half_space, found, context(), options);
-        return give(found, body->frame, -1, most, con); // ours points into the ground
+        contacts(b.tree, {}, half_space, found, context(), options);
+        add_manifolds(found, -1, touches); // ours points into the ground
+    } else if (const Tree* const simple = simple_tree(m, g1)) {
+        contacts(simple->view(), to_prolate(inverse(in_b) * frame), b.tree, {}, found, context(), options);
+        add_manifolds(found, 1, touches);
     }
-    const auto first = body_of(m, d, g1);
-    if (!first) return 0;
-    contacts(first->tree, {}, body->tree, to_prolate(inverse(first->frame) * body->frame), found, context(), options);
-    return give(found, first->frame, 1, most, con);
+    thin_out(touches, static_cast<size_t>(std::clamp(m->opt.sdf_initpoints, 0, mjMAXCONPAIR)));
+    return give(touches, in, con);
 }
 
 // --- registration ---------------------------------------------------------------------------------------------------

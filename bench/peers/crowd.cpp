@@ -12,6 +12,7 @@
 #include <prolate/build.hpp>
 #include <prolate/world_queries.hpp>
 
+#include <BulletCollision/CollisionShapes/btShapeHull.h>
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 #include <btBulletCollisionCommon.h>

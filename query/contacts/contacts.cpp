@@ -1,12 +1,13 @@
 // Contact manifolds: all pairs of leaves that meet, as collide_all() finds them, each turned into points with a normal
 // (pair_contacts.hpp), and all of these into a few manifolds (manifold.hpp).
 //
-// The pairs are gone through twice. The first time for the normals: of each pair that along which its surroundings
-// overlap least (query/triangle/contact.hpp), if that is less than what a patch found before needs to resolve it, that
-// is, to have it separated once the bodies are moved along the patch's normal. Normals of faces make patches, others
-// wait and count if no patch resolves them that is no deeper. Then the deepest vertices of each patch are found, and
-// patches all of which another one resolves are dropped. The second time for the points: of each pair along the normal
-// of the first patch that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
+// The pairs are gone through twice; the search runs again only if there are too many to be kept. The first time for the
+// normals: of each pair that along which its surroundings overlap least (query/triangle/contact.hpp), if that is less
+// than what a patch found before needs to resolve it, that is, to have it separated once the bodies are moved along the
+// patch's normal. Normals of faces make patches, others wait and count if no patch resolves them that is no deeper.
+// Then the deepest vertices of each patch are found, and patches all of which another one resolves are dropped. The
+// second time for the points: of each pair along the normal of the first patch that resolves it. (Compare Terdiman's
+// "voided features", which Bullet and Jolt have in variants.)
 //
 // Once there are more pairs than usual, both times leave out pairs of nodes that have the normal of a patch, which
 // resolves them, and reach no farther out than the patch's points (node_pair.hpp); the others are opened in the order
@@ -28,6 +29,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 namespace prolate {
@@ -52,7 +54,8 @@ class Collector {
 public:
     Collector(CollideSearch& search, Scratch context, bool exchanged, const LastContacts& last, uint64_t many)
         : search_(search), exchanged_(exchanged), many_(many), last_(last), size_(smaller_size(search)),
-          pairs_(search, context, kSamePoint * size_), patches_(kSamePoint * size_) {
+          pairs_(search, context, kSamePoint * size_), patches_(kSamePoint * size_),
+          of_ellipsoids_(!search.a.tree.has_triangles() && !search.b.tree.has_triangles()) {
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
         search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
         search.each_user = this;
@@ -79,6 +82,14 @@ public:
         for (uint32_t i = 0; i < count && way_count_ < kManifolds; ++i)
             if (needed[i]) ways_[way_count_] = groups[i].way, points_[way_count_] = groups[i].deepest, ++way_count_;
         settled_ = true;
+    }
+
+    // The second pass, if the first one left out nothing and these are its pairs.
+    void repeat(std::span<const MeetingPair> pairs) {
+        if (of_ellipsoids_)
+            for (size_t i = 0; i < pairs.size(); ++i) add_by_itself(waiting_.contacts[i]);
+        else
+            for (const MeetingPair& pair : pairs) add_points(pair);
     }
 
     // After both: patches with points, at least one if any pair met.
@@ -180,6 +191,7 @@ private:
                 known = {p.normal(), p.overlap()};
         });
         const ContactsOfPair found = pairs_.by_itself(pair, known);
+        if (of_ellipsoids_ && search_.found < kWaiting) waiting_.contacts[search_.found] = found.contacts[0];
         for (const Contact& c : found) {
             if (found.certain) { // what is no better than what resolves it gives points, not a direction
                 take(c, c.overlap <= known.overlap + same_point());
@@ -245,11 +257,12 @@ private:
             for (const Contact& c : found) add_to(points_[i], ways_[i].normal, c);
             if (found.certain) return;
         }
-        for (const Contact& c : pairs_.by_itself(pair)) {
-            Patch* const patch =
-                std::find_if(points_, points_ + way_count_, [&](const Patch& p) { return p.takes(c.normal); });
-            if (patch != points_ + way_count_) add_to(*patch, c.normal, c);
-        }
+        for (const Contact& c : pairs_.by_itself(pair)) add_by_itself(c);
+    }
+    void add_by_itself(const Contact& c) {
+        Patch* const patch =
+            std::find_if(points_, points_ + way_count_, [&](const Patch& p) { return p.takes(c.normal); });
+        if (patch != points_ + way_count_) add_to(*patch, c.normal, c);
     }
 
     void add_to(Patch& patch, const dvec3& normal, const Contact& c) const {
@@ -277,7 +290,10 @@ private:
     MeetingPair first_;
     Patches patches_; // of the first pass, for their normals
     static constexpr uint32_t kWaiting = 128;
+    // Of edges, corners and closest points, in the first pass. Ellipsoids have none: then the contact of each pair, for
+    // the second.
     ContactList<kWaiting> waiting_;
+    const bool of_ellipsoids_;
     uint32_t way_count_ = 0;
     Way ways_[kManifolds];
     Patch points_[kManifolds]; // of the second pass
@@ -298,7 +314,8 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
     const LastContacts last(manifolds, bodies.exchanged, to_world);
     manifolds = {};
     Collector collector(search, context, bodies.exchanged, last, many);
-    search.all = true;
+    MeetingPair met[kMany];
+    search.all = true, search.pairs = met;
     ContactResult out;
     out.verdict = decide(search);
     out.enclosed = out.verdict == Verdict::overlapping && search.found == 0;
@@ -309,8 +326,13 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
 
     if (search.found > 0) {
         collector.settle();
-        search.found = 0, search.stats = {}, search.other_tests = 0; // what they count is known
-        traverse(search);
+        search.stats = {}, search.other_tests = 0; // what they count is known
+        if (out.found < std::min(many, kMany)) {
+            collector.repeat({met, static_cast<size_t>(out.found)});
+        } else {
+            search.found = 0;
+            traverse(search);
+        }
     }
     const Patch* patches[kManifolds];
     manifolds.count = collector.patches(patches);
