@@ -91,8 +91,8 @@ struct ContactResult {
 /// of a manifold's normals does to points that are not its deepest.
 ///
 /// Pairs are gone through twice, first to find the normals, then to collect the points; of 64 and more, the search
-/// runs twice. The answer's counters, and options.max_pair_tests, count one run. query/contacts/contacts.cpp has the details, query/triangle/contact.hpp the
-/// normals.
+/// runs twice. The answer's counters, and options.max_pair_tests, count one run. query/contacts/contacts.cpp has the
+/// details, query/triangle/contact.hpp the normals.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, Scratch context, const QueryOptions& options = {}) noexcept;
 
