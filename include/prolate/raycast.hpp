@@ -15,6 +15,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
 
 namespace prolate {
 
@@ -55,8 +56,13 @@ struct RaycastResult {
 RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                       const QueryOptions& options = {}) noexcept;
 
-/// The same, but stops at any hit, which need not be the first: for shadows and lines of sight. The verdict is that of
-/// raycast().
+/// The same for many rays: out[i] is the answer for rays[i], to the bit, for as many as both spans have. What depends
+/// on the body and its pose alone is prepared once.
+void raycast(const TreeView& tree, const Pose& pose, std::span<const Ray> rays, std::span<RaycastResult> out,
+             Scratch context, const QueryOptions& options = {}) noexcept;
+
+/// The same as for one ray, but stops at any hit, which need not be the first: for shadows and lines of sight. The
+/// verdict is that of raycast().
 RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                           const QueryOptions& options = {}) noexcept;
 

@@ -45,14 +45,41 @@
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
+/// A ray as a block's boxes see it, in box steps: it passes the side of a box at x where s = (x - near) inverse, or
+/// with `far` for the sides that it leaves through.
+struct BoxRay {
+    alignas(32) float near[4], far[4], inverse[4]; // the fourth means nothing
+};
+HWY_INLINE BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
+    using Axes = hn::CappedTag<double, 4>;
+    const hn::Rebind<float, Axes> f;
+    const hn::Rebind<int32_t, Axes> i;
+    BoxRay out;
+    for (size_t at = 0; at < 4; at += hn::MaxLanes(f)) {
+        const auto from = hn::PromoteTo(Axes(), load_stored<int32_t>(Axes(), block + kBlockBoxOrigin + 4 * at));
+        const auto origin = hn::DemoteTo(f, hn::PromoteTo(Axes(), hn::Load(f, ray.origin + at)) - from);
+        const auto exponent = hn::PromoteTo(i, load_stored<uint8_t>(Axes(), block + kBlockBoxExponent + at));
+        const auto power = [&](auto e) { return hn::BitCast(f, hn::ShiftLeft<23>(hn::Set(i, 127) + e)); };
+        const auto step = power(exponent), per_step = power(hn::Neg(exponent));
+        const auto wider =
+            hn::Load(f, ray.forward + at) *
+            (hn::Set(f, ray.thickness) + (hn::Set(f, ray.slack) + hn::Set(f, kLaneMargin) * hn::Abs(origin)));
+        hn::Store((origin + wider) * per_step, f, out.near + at);
+        hn::Store((origin - wider) * per_step, f, out.far + at);
+        hn::Store(hn::Load(f, ray.inverse + at) * step, f, out.inverse + at);
+    }
+    return out;
+}
+
 /// Lower bounds of the parameters at which the ray enters the boxes of lanes `first` and following; infinite if it does
 /// not before `limit` <= 1. NaN, which a ray that is not finite makes, is passed over.
-HWY_INLINE Float box_entries(const std::byte* block, size_t first, const BoxRay& ray, Float limit) {
+HWY_INLINE Float box_entries(const std::byte* block, size_t first, const LatticeRay& ray, const BoxRay& boxes,
+                             Float limit) {
     Float enter = set(0), leave = limit;
     for (size_t i = 0; i < 3; ++i) {
         const auto side = [&](size_t array) { return box_sides(block, array, i, first); };
-        enter = greater(enter, (side(ray.near_side[i]) - ray.near[i]) * ray.inverse[i]);
-        leave = lesser(leave, (side(ray.far_side[i]) - ray.far[i]) * ray.inverse[i]);
+        enter = greater(enter, (side(ray.near_side[i]) - boxes.near[i]) * boxes.inverse[i]);
+        leave = lesser(leave, (side(ray.far_side[i]) - boxes.far[i]) * boxes.inverse[i]);
     }
     return choose(enter > leave, set(std::numeric_limits<float>::infinity()), enter);
 }

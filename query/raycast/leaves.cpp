@@ -5,27 +5,31 @@
 
 namespace prolate::query {
 
+namespace {
+
+template <class Leaf> std::optional<RayHit> hit_by(const RaycastSearch& search, const Leaf& leaf) {
+    const double margin = double{search.options.margin};
+    if (!(margin > 0)) return hit(search.ray, leaf);
+    PlacedRay still_open = search.ray; // what lies behind the best hit takes less time
+    if (search.found) still_open.length = search.best.t;
+    return hit_within(margin, still_open, leaf);
+}
+
+bool take(RaycastSearch& search, const std::optional<RayHit>& hit, uint32_t leaf, uint32_t triangle) {
+    if (!hit || (search.found && !(hit->t < search.best.t))) return false;
+    search.found = true, search.best = *hit, search.node = leaf, search.triangle = triangle;
+    return true;
+}
+
+} // namespace
+
 bool RaycastSearch::meet(uint32_t at) noexcept {
-    const auto take = [&](const std::optional<RayHit>& hit, uint32_t t) {
-        if (!hit || (found && !(hit->t < best.t))) return false;
-        found = true, best = *hit, node = at, triangle = t;
-        return true;
-    };
-    const TriangleRange triangles = side.tree.triangles(at);
-    const auto hit_by = [&](const auto& leaf) {
-        if (!(options.margin > 0)) return hit(ray, leaf);
-        PlacedRay still_open = ray; // what lies behind the best hit takes less time
-        if (found) still_open.length = best.t;
-        return hit_within(double{options.margin}, still_open, leaf);
-    };
-    if (triangles.count == 0 || growth)
-        return take(hit_by(place(growth ? side.tree.ellipsoid(at) : side.tree.bound(at), side.tree.scale())),
-                    kNoTriangle);
-    bool taken = false;
-    stats.triangle_tests += triangles.count;
-    for (uint32_t t = triangles.first; t < triangles.first + triangles.count; ++t)
-        taken = take(hit_by(place(side.tree, t)), t) || taken;
-    return taken;
+    const PlacedEllipsoid e = place(growth ? side.tree.ellipsoid(at) : side.tree.bound(at), side.tree.scale());
+    return take(*this, hit_by(*this, e), at, kNoTriangle);
+}
+
+bool RaycastSearch::meet_triangle(uint32_t leaf, uint32_t t) noexcept {
+    return take(*this, hit_by(*this, place(side.tree, t)), leaf, t);
 }
 
 } // namespace prolate::query

@@ -130,6 +130,19 @@ std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Conv
     return RayHit{t, room >= 0 ? n : dvec3(0)};
 }
 
+RayShear shear_to_axis(const dvec3& d) {
+    const size_t k = std::abs(d.x) > std::abs(d.y) ? (std::abs(d.x) > std::abs(d.z) ? 0 : 2)
+                                                   : (std::abs(d.y) > std::abs(d.z) ? 1 : 2);
+    const size_t i = (k + 1) % 3, j = (k + 2) % 3;
+    const double along = d[static_cast<glm::length_t>(k)];
+    return {.i = i,
+            .j = j,
+            .k = k,
+            .shear = {d[static_cast<glm::length_t>(i)] / along, d[static_cast<glm::length_t>(j)] / along},
+            .sign = along < 0 ? -1.0 : 1.0,
+            .per_t = std::abs(along)};
+}
+
 } // namespace
 
 PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllipsoid& bound, double distance) noexcept {
@@ -142,11 +155,13 @@ PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllips
     const double middle = glm::dot(bound.center - origin, direction) / (speed * speed), half = radius / speed;
     const double begin = std::max(0.0, middle - half), end = std::min(double{ray.max_t}, middle + half);
     PlacedRay out{};
-    out.valid = std::isfinite(begin) && std::isfinite(end);
+
     out.empty = begin > end;
     out.origin = origin + begin * direction, out.direction = direction;
     out.begin = begin, out.length = end - begin;
     out.reach = reach + end * speed;
+    out.valid = std::isfinite(begin) && std::isfinite(end) && std::isfinite(out.reach);
+    out.shear = shear_to_axis(direction);
     return out;
 }
 
@@ -166,21 +181,19 @@ std::optional<RayHit> hit(const PlacedRay& ray, const PlacedEllipsoid& e, double
 }
 
 std::optional<RayHit> hit(const PlacedRay& ray, const PlacedTriangle& triangle, double margin) noexcept {
-    const dvec3 d = ray.direction;
     const double tau = margin * (ray.reach + triangle.reach);
-    const glm::length_t k = std::abs(d.x) > std::abs(d.y) ? (std::abs(d.x) > std::abs(d.z) ? 0 : 2)
-                                                          : (std::abs(d.y) > std::abs(d.z) ? 1 : 2);
-    const glm::length_t i = (k + 1) % 3, j = (k + 2) % 3;
-    const double shear_x = d[i] / d[k], shear_y = d[j] / d[k], sign = d[k] < 0 ? -1 : 1;
+    const RayShear& shear = ray.shear;
+    const auto i = static_cast<glm::length_t>(shear.i), j = static_cast<glm::length_t>(shear.j),
+               k = static_cast<glm::length_t>(shear.k);
     Corner c[3];
     for (size_t n = 0; n < 3; ++n) {
         const dvec3 p = triangle.corner[n] - ray.origin;
-        c[n] = {p[i] - shear_x * p[k], p[j] - shear_y * p[k], sign * p[k]};
+        c[n] = {p[i] - shear.shear[0] * p[k], p[j] - shear.shear[1] * p[k], shear.sign * p[k]};
     }
     const auto [left, right] = std::minmax({c[0].x, c[1].x, c[2].x});
     const auto [bottom, top] = std::minmax({c[0].y, c[1].y, c[2].y});
     const auto [low, high] = std::minmax({c[0].z, c[1].z, c[2].z});
-    const double end = ray.length * std::abs(d[k]);
+    const double end = ray.length * shear.per_t;
     if (left > tau || right < -tau || bottom > tau || top < -tau || high < -tau || low > end + tau) return {};
 
     double weight[3], error = 0; // of the opposite corners
@@ -206,7 +219,7 @@ std::optional<RayHit> hit(const PlacedRay& ray, const PlacedTriangle& triangle, 
     }
     if (to < -tau || from > end + tau) return {};
     const dvec3 normal = glm::cross(triangle.corner[1] - triangle.corner[0], triangle.corner[2] - triangle.corner[0]);
-    return RayHit{std::clamp(depth / std::abs(d[k]), 0.0, ray.length), normal};
+    return RayHit{std::clamp(depth / shear.per_t, 0.0, ray.length), normal};
 }
 
 std::optional<RayHit> hit_within(double distance, const PlacedRay& ray, const PlacedEllipsoid& e,

@@ -42,13 +42,22 @@ namespace prolate::query {
 
 inline constexpr double kRayMargin = 0x1p-44;
 
+/// How triangles are turned so that the ray is the z-axis: x' = x_i - shear[0] x_k, y' = x_j - shear[1] x_k, z' = sign
+/// x_k, of points from its origin.
+struct RayShear {
+    size_t i, j, k; ///< k: the axis along which the ray is longest
+    double shear[2], sign;
+    double per_t; ///< z' for each t
+};
+
 /// A ray in the tree's frame: origin + t direction, 0 <= t <= length, where t = 0 is the ray's own t = `begin`.
 struct PlacedRay {
     glm::dvec3 origin, direction;
     double begin, length;
     double reach; ///< its share of S
-    bool empty;   ///< certainly misses the ellipsoid that it was cut down to
-    bool valid;   ///< all is finite, and the direction not 0
+    RayShear shear;
+    bool empty; ///< certainly misses the ellipsoid that it was cut down to
+    bool valid; ///< all is finite, and the direction not 0
 };
 /// `to_frame`: from a frame at the ray's origin that is turned as the world, to the tree's. Cuts the ray down to what
 /// may come as near to `bound` as `distance`.

@@ -18,8 +18,10 @@
 
 #include "query/raycast/lanes-inl.hpp"
 #include "query/raycast/search.hpp"
+#include "query/raycast/triangle_lanes-inl.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -37,10 +39,12 @@ public:
         while (size_ > 0) {
             const Scratch::Entry e = s_.stack[--size_];
             if (e.bound > limit_) continue;
-            const ChildRange children = s_.side.tree.children(e.node_a);
-            if (children.count == 0 || e.node_a >= s_.side.limit_from) {
-                if (s_.side.tree.triangles(e.node_a).count > s_.left()) return !leave_aside(e.bound);
-                if (!s_.meet(e.node_a)) continue;
+            const uint32_t lane = e.node_a % kBlockLanes;
+            const std::byte* const block = s_.side.block(e.node_a);
+            if ((s_.side.leaf_lanes(e.node_a - lane, block) >> lane & 1) != 0 || e.node_a >= s_.side.limit_from) {
+                const TriangleRange triangles = s_.side.tree.triangles(e.node_a);
+                if (triangles.count > s_.left()) return !leave_aside(e.bound);
+                if (!meet(e.node_a, triangles)) continue;
                 if (s_.any) return leave_aside(std::numeric_limits<float>::infinity());
                 const double limit = s_.best.t / s_.ray.length;
                 // Rounded up; below the kernel's margin anyway, as is the division's rounding.
@@ -48,13 +52,32 @@ public:
                 continue;
             }
             base_ = size_;
-            if (!for_each_block(children, [&](uint32_t first, uint32_t count) { return test(first, count); }))
+            if (!for_each_block(children_in(block, lane),
+                                [&](uint32_t first, uint32_t count) { return test(first, count); }))
                 return !leave_aside(e.bound);
         }
         return true;
     }
 
 private:
+    // A leaf, or a node that stands for what is below it. True if a hit is the best now.
+    bool meet(uint32_t at, const TriangleRange& triangles) {
+        if (triangles.count == 0 || kGrown) return s_.meet(at);
+        s_.stats.triangle_tests += triangles.count;
+        bool taken = false;
+        for (uint32_t i = 0; i < triangles.count; i += kFour) {
+            const uint32_t first = triangles.first + i, count = std::min(triangles.count - i, uint32_t{kFour});
+            uint32_t open = (1u << count) - 1;
+            if (!(s_.options.margin > 0)) { // what lies beyond the best hit is not taken
+                const double farthest = s_.found ? s_.best.t : s_.ray.length;
+                open = may_hit(s_.side.tree, first, count, s_.ray, s_.reach, farthest);
+            }
+            for (; open != 0; open &= open - 1)
+                taken = s_.meet_triangle(at, first + static_cast<uint32_t>(std::countr_zero(open))) || taken;
+        }
+        return taken;
+    }
+
     // One block: puts the lanes that may be met on the stack, the nearest of the family on top.
     bool test(uint32_t first, uint32_t count) {
         if (count > s_.left()) return false;
@@ -64,23 +87,28 @@ private:
         const std::byte* const block = kGrown ? s_.side.tree.raw().block(first / kBlockLanes) : s_.side.block(first);
         const int32_t step_exponent = s_.side.lattice.step_exponent;
         const Float limit = set(limit_);
+        uint32_t open = 0;
+        const auto keep = [&](Float enter, size_t i) {
+            store(enter, entries + i);
+            open |= bits(enter <= limit) << i;
+        };
         if constexpr (kGrown) {
             for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
                 const LaneNodes nodes =
                     grown(load_nodes(block, i, step_exponent), load_unaligned(s_.growth + first + i));
-                store(entry_lanes<kThick>(nodes, s_.lattice_ray, limit), entries + i);
+                keep(entry_lanes<kThick>(nodes, s_.lattice_ray, limit), i);
             }
         } else {
             const BoxRay boxes = box_ray(block, s_.lattice_ray);
             for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
-                Float enter = box_entries(block, i, boxes, limit);
+                Float enter = box_entries(block, i, s_.lattice_ray, boxes, limit);
                 if ((kThick || !boxes_suffice_) && !all(enter > limit))
                     enter = max(enter, entry_lanes<kThick>(load_nodes(block, i, step_exponent), s_.lattice_ray, limit));
-                store(enter, entries + i);
+                keep(enter, i);
             }
         }
-        for (uint32_t lane = 0; lane < count; ++lane) {
-            if (!(entries[lane] <= limit_)) continue;
+        for (open &= (1u << count) - 1; open != 0; open &= open - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(open));
             uint32_t at = size_++;
             for (; at > base_ && s_.stack[at - 1].bound < entries[lane]; --at) s_.stack[at] = s_.stack[at - 1];
             s_.stack[at] = {first + lane, 0, entries[lane], 0};

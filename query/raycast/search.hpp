@@ -14,22 +14,33 @@
 namespace prolate::query {
 
 struct RaycastSearch {
+    // Of all rays.
     TreeSide side;
-    const PlacedRay ray;
-    const LatticeRay lattice_ray;
     const QueryOptions options; // sound
-    const bool any;             ///< stop at the first hit that is found
     const float* const growth;  ///< of raycast_cut(): by slots; else null
     Scratch::Entry* const stack;
+    const double reach; ///< at least that of every triangle
+    // Of one.
+    PlacedRay ray;
+    LatticeRay lattice_ray;
+    bool any; ///< stop at the first hit that is found
     QueryStats stats;
-    bool found = false;
-    RayHit best{};           ///< of the placed ray
-    double clear = HUGE_VAL; ///< of the placed ray: the least bound of what was left aside
-    uint32_t node = 0, triangle = kNoTriangle;
+    bool found;
+    RayHit best;  ///< of the placed ray
+    double clear; ///< of the placed ray: the least bound of what was left aside
+    uint32_t node, triangle;
 
-    /// Decides on the leaf `at`, or on a node that max_level lets stand for what is below it. True if a hit is the best
-    /// now.
+    RaycastSearch(const TreeSide& tree_side, const QueryOptions& sound, const float* grown, Scratch::Entry* scratch,
+                  double triangle_reach) noexcept
+        : side(tree_side), options(sound), growth(grown), stack(scratch), reach(triangle_reach) {}
+    /// Makes ready for a ray.
+    void begin(const PlacedRay& placed, bool any_hit) noexcept;
+
+    /// Decides on the ellipsoid of the leaf `at`, or of a node that stands for what is below it. True if a hit is the
+    /// best now.
     bool meet(uint32_t at) noexcept;
+    /// The same of one triangle of a leaf.
+    bool meet_triangle(uint32_t leaf, uint32_t triangle) noexcept;
     /// Tests left of the budget.
     uint64_t left() const noexcept { return tests_left(options.max_pair_tests, stats.tests()); }
 };

@@ -146,16 +146,19 @@ HWY_INLINE void store_unaligned(Float x, float* to) {
     hn::StoreU(x, FloatTag(), to);
 }
 
-/// Little-endian integers of one or two bytes at any address, of four bytes each.
-template <class T> HWY_INLINE auto load_widened(const std::byte* from) {
-    const hn::Rebind<T, FloatTag> tag;
+/// Little-endian integers at any address, as many as Tag has lanes.
+template <class T, class Tag> HWY_INLINE auto load_stored(Tag, const std::byte* from) {
+    const hn::Rebind<T, Tag> tag;
 #if HWY_TARGET == HWY_SCALAR
-    const auto stored = hn::Set(tag, load_le<T>(from));
+    return hn::Set(tag, load_le<T>(from));
 #else
     const hn::Repartition<uint8_t, decltype(tag)> bytes;
-    const auto stored = hn::BitCast(tag, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(from)));
+    return hn::BitCast(tag, hn::LoadU(bytes, reinterpret_cast<const uint8_t*>(from)));
 #endif
-    return hn::PromoteTo(hn::Rebind<int32_t, FloatTag>(), stored);
+}
+/// Those of one or two bytes, of four bytes each.
+template <class T> HWY_INLINE auto load_widened(const std::byte* from) {
+    return hn::PromoteTo(hn::Rebind<int32_t, FloatTag>(), load_stored<T>(FloatTag(), from));
 }
 /// And as floats.
 template <class T> HWY_INLINE Float load_integers(const std::byte* from) {

@@ -42,7 +42,9 @@ public:
     }
     uint32_t count() const { return count_; }
     glm::dvec3 first_corner() const { return glm::dvec3(origin_[0], origin_[1], origin_[2]) * double{tree_scale_}; }
-    /// As they stand, less the first corner's: coordinate row % 3 of corner row / 3, of the lanes from `i` on. A scale
+    /// As they stand in the file, before the tree's scale.
+    const float* stored(size_t row) const { return rows_[row]; }
+    /// The same, less the first corner's: coordinate row % 3 of corner row / 3, of the lanes from `i` on. A scale
     /// of the tree that is no power of two rounds it once more.
     Quad from_first(size_t row, size_t i) const { return stored_from_first(row, i) * tree_scale_; }
 

@@ -101,14 +101,21 @@ AxisMask axis_mask(const std::byte* block, uint32_t lane, int32_t step_exponent,
     return {!(widened + r[axis] < 0), !(widened - r[axis] < 0)};
 }
 
-float box_entry(const std::byte* block, uint32_t lane, const BoxRay& ray, float limit) {
+float box_entry(const std::byte* block, uint32_t lane, const LatticeRay& ray, float limit) {
+    const BlockBoxes boxes(block);
     float enter = 0, leave = limit;
     for (size_t i = 0; i < 3; ++i) {
         const auto side = [&](size_t at) {
             return static_cast<float>(load_le<uint8_t>(block + at + kBlockLanes * i + lane));
         };
-        const float in = (side(ray.near_side[i]) - ray.near[i]) * ray.inverse[i];
-        const float out = (side(ray.far_side[i]) - ray.far[i]) * ray.inverse[i];
+        const float per_step = boxes.per_step(i), inverse = ray.inverse[i] * boxes.step(i);
+        const auto origin = static_cast<float>(ray.origin[i] - static_cast<double>(boxes.origin(i)));
+        const float margin = ray.thickness + (ray.slack + kLaneMargin * std::abs(origin));
+        const bool forward = !(ray.inverse[i] < 0);
+        const float near = (forward ? origin + margin : origin - margin) * per_step;
+        const float far = (forward ? origin - margin : origin + margin) * per_step;
+        const float in = (side(forward ? kBlockBoxLow : kBlockBoxHigh) - near) * inverse;
+        const float out = (side(forward ? kBlockBoxHigh : kBlockBoxLow) - far) * inverse;
         if (in > enter) enter = in;
         if (out < leave) leave = out;
     }

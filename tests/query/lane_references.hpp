@@ -30,7 +30,7 @@ AxisMask axis_mask(const std::byte* block, uint32_t lane, int32_t step_exponent,
                    uint32_t axis);
 
 /// Of query/raycast/lanes-inl.hpp.
-float box_entry(const std::byte* block, uint32_t lane, const BoxRay& ray, float limit);
+float box_entry(const std::byte* block, uint32_t lane, const LatticeRay& ray, float limit);
 float ray_entry(const std::byte* block, uint32_t lane, int32_t step_exponent, const LatticeRay& ray, float limit);
 
 /// Of query/shapes/lanes-inl.hpp.

@@ -41,9 +41,10 @@ void block_entries(const std::byte* block, int32_t step_exponent, const LatticeR
     }
 }
 
-void block_box_entries(const std::byte* block, const BoxRay& ray, float limit, float entries[kBlockLanes]) {
+void block_box_entries(const std::byte* block, const LatticeRay& ray, float limit, float entries[kBlockLanes]) {
+    const BoxRay boxes = box_ray(block, ray);
     for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
-        store_unaligned(box_entries(block, i, ray, set(limit)), entries + i);
+        store_unaligned(box_entries(block, i, ray, boxes, set(limit)), entries + i);
 }
 
 } // namespace prolate::query::HWY_NAMESPACE
@@ -189,7 +190,7 @@ Counts hunt_thick_rays(uint64_t seed, uint32_t blocks, double ratio, double slac
         const LatticeRay ray = place(g, b.lattice, slack_factor, thickness);
         float entries[kBlockLanes], boxes[kBlockLanes];
         HWY_DYNAMIC_DISPATCH(block_entries)(bytes, b.lattice.step_exponent, ray, 1, entries);
-        HWY_DYNAMIC_DISPATCH(block_box_entries)(bytes, box_ray(bytes, ray), 1, boxes);
+        HWY_DYNAMIC_DISPATCH(block_box_entries)(bytes, ray, 1, boxes);
         ++counts.rays, counts.met += meets, counts.missed += std::isinf(entries[lane]);
         counts.wrong += meets && !(std::max(entries[lane], boxes[lane]) <= begin);
     }
@@ -231,7 +232,7 @@ Counts hunt_boxes(uint64_t seed, uint32_t blocks, double slack_factor = 1) {
         }
         const LatticeRay ray = place(g, b.lattice, slack_factor);
         float entries[kBlockLanes];
-        HWY_DYNAMIC_DISPATCH(block_box_entries)(bytes, box_ray(bytes, ray), 1, entries);
+        HWY_DYNAMIC_DISPATCH(block_box_entries)(bytes, ray, 1, entries);
         for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
             Real enter = 0, leave = 1;
             for (size_t i = 0; i < 3; ++i) {
@@ -353,10 +354,9 @@ TEST(RayLanes, SameBitsOnEveryTargetAndInPlainCode) {
                 }
             }
             if (b.bytes[kBlockBoxExponent] > std::byte{kMaxBoxExponent}) continue; // open() refuses these
-            const BoxRay boxes = box_ray(b.bytes.data(), ray);
-            HWY_DYNAMIC_DISPATCH(block_box_entries)(b.bytes.data(), boxes, 0.75f, entries);
+            HWY_DYNAMIC_DISPATCH(block_box_entries)(b.bytes.data(), ray, 0.75f, entries);
             for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
-                const float expected = box_entry(b.bytes.data(), lane, boxes, 0.75f);
+                const float expected = box_entry(b.bytes.data(), lane, ray, 0.75f);
                 ASSERT_EQ(std::bit_cast<uint32_t>(expected), std::bit_cast<uint32_t>(entries[lane]))
                     << name << ' ' << n;
             }

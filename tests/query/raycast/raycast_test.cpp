@@ -543,6 +543,36 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
     }
 }
 
+TEST(Raycast, ABatchAnswersAsSingleRaysDo) {
+    const auto scene = scenes::exact_tree(shapes::torus(1, 0.3f, 40, 16));
+    const auto tree = *TreeView::open(scene.bytes);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    Random random(8);
+    for (const float margin : {0.0f, 0.01f}) {
+        const Pose pose = scenes::pose_at(random, 2);
+        std::vector<Ray> rays;
+        for (int n = 0; n < 300; ++n) rays.push_back(aimed(random, scene.mesh, pose, 1));
+        rays[7].origin.x = nan, rays[9].direction = {0, 0, 0}, rays[11].max_t = -1;
+        std::vector<RaycastResult> out(rays.size() + 1);
+        raycast(tree, pose, rays, out, context(), {.margin = margin});
+        for (size_t i = 0; i < rays.size(); ++i) {
+            const RaycastResult single = cast(tree, pose, rays[i], {.margin = margin});
+            ASSERT_EQ(out[i].verdict, single.verdict) << i;
+            ASSERT_EQ(out[i].t, single.t);
+            ASSERT_EQ(out[i].clear, single.clear);
+            ASSERT_EQ(vector(out[i].point), vector(single.point));
+            ASSERT_EQ(vector(out[i].normal), vector(single.normal));
+            ASSERT_EQ(out[i].node, single.node);
+            ASSERT_EQ(out[i].triangle, single.triangle);
+            ASSERT_EQ(out[i].stats.tests(), single.stats.tests());
+            ASSERT_EQ(out[i].stats.deepest_level, single.stats.deepest_level);
+        }
+        EXPECT_EQ(out[7].verdict, Verdict::undecided);
+        EXPECT_EQ(out[11].verdict, Verdict::separated);
+        EXPECT_EQ(out.back().t, RaycastResult{}.t); // only as many as there are rays
+    }
+}
+
 TEST(Raycast, ClosedMeshesHaveNoHoles) {
     // From inside, at vertices, edges and anywhere: every ray must meet something.
     const auto scene = scenes::exact_tree(shapes::icosphere(3));
@@ -737,6 +767,12 @@ TEST(Raycast, BadInputIsUndecided) {
     EXPECT_EQ(cast(tree, {}, {{0, 0, -1}, {0, infinity, 1}}).verdict, Verdict::undecided);
     EXPECT_EQ(cast(tree, {}, {{0, 0, -1}, {0, 0, 1}, nan}).verdict, Verdict::undecided);
     EXPECT_EQ(cast(tree, {{}, {0, 0, 0, 0}}, {{0, 0, -1}, {0, 0, 1}}).verdict, Verdict::undecided);
+    for (const float bad : {nan, infinity, -infinity}) // also of a ray that ends
+        for (const float max_t : {5.0f, infinity}) {
+            EXPECT_EQ(cast(tree, {}, {{0, bad, -1}, {0, 0, 1}, max_t}).verdict, Verdict::undecided);
+            EXPECT_EQ(cast(tree, {{0, bad, 0}, {}}, {{0, 0, -1}, {0, 0, 1}, max_t}).verdict, Verdict::undecided);
+            EXPECT_EQ(cast(tree, {{}, {0, bad, 0, 1}}, {{0, 0, -1}, {0, 0, 1}, max_t}).verdict, Verdict::undecided);
+        }
     EXPECT_EQ(cast(tree, {}, {{0.5f, 0.5f, -1}, {0, 0, 1}, -1}).verdict, Verdict::separated);
     EXPECT_EQ(cast(tree, {}, {{0.5f, 0.5f, -1}, {0, 0, 1}, 0.5f}).verdict, Verdict::separated);
     EXPECT_EQ(cast(tree, {}, {{0.5f, 0.5f, -1}, {0, 0, 1}, 1}).verdict, Verdict::overlapping);

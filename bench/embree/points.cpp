@@ -2,21 +2,19 @@
 //
 //   bench_points MESH [--points N]
 //
-// Prints for each set of points the median time of one query, of runs over all points that take turns, Embree's over
-// that of single queries, and how far the two distances are apart at most. Embree has no inside; what finds the nearest
-// triangle there is the callback of its documentation (closest point of a triangle, in single precision).
+// Prints for each set of points the median CPU time of one query, of runs over all points that take turns, Embree's
+// over that of single queries, and how far the two distances are apart at most. Embree has no inside; what finds the
+// nearest triangle there is the callback of its documentation (closest point of a triangle, in single precision).
+#include "bench/embree/scene.hpp"
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
 #include <prolate/points.hpp>
 
-#include <embree3/rtcore.h>
-
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <string>
@@ -25,17 +23,7 @@
 namespace prolate {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
-float dot(const Vec3& a, const Vec3& b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Vec3 minus(const Vec3& a, const Vec3& b) {
-    return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-Vec3 along(const Vec3& a, float t, const Vec3& d) {
-    return {a.x + t * d.x, a.y + t * d.y, a.z + t * d.z};
-}
+using embree::along, embree::dot, embree::medians, embree::minus;
 
 // C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
 Vec3 closest_point(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -58,35 +46,15 @@ Vec3 closest_point(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
     return along(along(a, vb / sum, ab), vc / sum, ac);
 }
 
-class EmbreeScene {
+class Nearest {
 public:
-    explicit EmbreeScene(const Mesh& mesh)
-        : mesh_(mesh), device_(rtcNewDevice("threads=1")), scene_(rtcNewScene(device_)) {
-        rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
-        const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* const vertices = static_cast<Vec3*>(rtcSetNewGeometryBuffer(
-            geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3), mesh.vertices.size()));
-        std::copy(mesh.vertices.begin(), mesh.vertices.end(), vertices);
-        auto* const triangles = static_cast<Triangle*>(rtcSetNewGeometryBuffer(
-            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Triangle), mesh.triangles.size()));
-        std::copy(mesh.triangles.begin(), mesh.triangles.end(), triangles);
-        rtcCommitGeometry(geometry);
-        rtcAttachGeometry(scene_, geometry);
-        rtcReleaseGeometry(geometry);
-        rtcCommitScene(scene_);
-    }
-    EmbreeScene(const EmbreeScene&) = delete;
-    EmbreeScene& operator=(const EmbreeScene&) = delete;
-    ~EmbreeScene() {
-        rtcReleaseScene(scene_);
-        rtcReleaseDevice(device_);
-    }
+    explicit Nearest(const Mesh& mesh) : mesh_(mesh), scene_(mesh) {}
 
     float distance(const Vec3& p) const {
         RTCPointQuery query{p.x, p.y, p.z, 0, HUGE_VALF};
         RTCPointQueryContext context;
         rtcInitPointQueryContext(&context);
-        rtcPointQuery(scene_, &query, &context, visit, const_cast<Mesh*>(&mesh_));
+        rtcPointQuery(scene_.get(), &query, &context, visit, const_cast<Mesh*>(&mesh_));
         return query.radius;
     }
 
@@ -103,8 +71,7 @@ private:
     }
 
     const Mesh& mesh_;
-    RTCDevice device_;
-    RTCScene scene_;
+    const embree::Scene scene_;
 };
 
 struct PointSet {
@@ -144,28 +111,6 @@ std::vector<PointSet> point_sets(const Mesh& mesh, size_t count) {
     return sets;
 }
 
-// Medians of runs that take turns, so that whatever else the machine does falls upon all alike.
-template <class... Runs> std::vector<double> medians(size_t queries, Runs&&... runs) {
-    constexpr int kRounds = 15;
-    std::vector<std::vector<double>> times(sizeof...(runs));
-    for (int round = 0; round < kRounds; ++round) {
-        size_t at = 0;
-        const auto time = [&](auto&& run) {
-            const auto start = Clock::now();
-            run();
-            const std::chrono::duration<double, std::micro> taken = Clock::now() - start;
-            times[at++].push_back(taken.count() / static_cast<double>(queries));
-        };
-        (time(runs), ...);
-    }
-    std::vector<double> out;
-    for (auto& t : times) {
-        std::nth_element(t.begin(), t.begin() + kRounds / 2, t.end());
-        out.push_back(t[kRounds / 2]);
-    }
-    return out;
-}
-
 int run(const std::string& path, size_t count) {
     const auto loaded = load_mesh(path.c_str());
     if (!loaded) return fmt::print(stderr, "bench_points: {}\n", loaded.error().what), 1;
@@ -174,7 +119,7 @@ int run(const std::string& path, size_t count) {
     if (!cleaned || !built) return fmt::print(stderr, "bench_points: cannot bake {}\n", path), 1;
     const Mesh& mesh = cleaned->mesh;
     const TreeView tree = built->tree.view();
-    const EmbreeScene embree(mesh);
+    const Nearest nearest(mesh);
     const auto context = std::make_unique<QueryContext>();
     fmt::print("{}: {} triangles, {}; median us a query\n", path, mesh.triangles.size(),
                cleaned->report.closed ? "closed" : "open: no sides");
@@ -193,7 +138,7 @@ int run(const std::string& path, size_t count) {
             [&] { signed_distance(tree, {}, points, out, *context); },
             [&] { contains(tree, {}, points, sides, *context); },
             [&] {
-                for (size_t i = 0; i < points.size(); ++i) theirs[i] = embree.distance(points[i]);
+                for (size_t i = 0; i < points.size(); ++i) theirs[i] = nearest.distance(points[i]);
             });
         double difference = 0;
         size_t inside = 0;
