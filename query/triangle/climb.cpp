@@ -47,21 +47,8 @@ private:
 
 } // namespace
 
-double Hills::height(uint32_t vertex, const dvec3& up) const noexcept {
-    return glm::dot(up, to_double(tree_.vertex(vertex))) * double{tree_.scale()};
-}
-
 // Calls visit(corners) for each triangle that has this vertex.
-template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) const {
-    if (tests_ > most_tests_) return;
-    Known& known = known_[vertex % kKnown];
-    if (known.vertex == vertex) {
-        tests_ += known.tests;
-        for (uint32_t i = 0; i < known.count; ++i) visit(tree_.triangle(known.triangles[i]));
-        return;
-    }
-    const uint64_t before = tests_;
-    known.vertex = vertex, known.count = 0;
+template <class Visit> void Hills::find(uint32_t vertex, Visit&& visit) const {
     const BoxProbe probe(tree_.raw().lattice(), tree_.vertex(vertex));
     struct Family {
         uint32_t first, left; // siblings from slot `first` on
@@ -89,38 +76,85 @@ template <class Visit> void Hills::triangles_at(uint32_t vertex, Visit&& visit) 
             for (uint32_t t = begin; t < begin + triangles; ++t) {
                 const Triangle corners = tree_.triangle(t);
                 if (std::find(corners.begin(), corners.end(), vertex) == corners.end()) continue;
-                if (known.count < Known::kMost) known.triangles[known.count] = t;
-                ++known.count;
                 visit(corners);
             }
         }
     }
+}
+
+uint32_t Hills::Known::place_of(uint32_t neighbour) const noexcept {
+    return static_cast<uint32_t>(std::find(neighbours, neighbours + neighbour_count, neighbour) - neighbours);
+}
+
+// What is known of a vertex, found if it is not. Null if it has too many neighbours.
+const Hills::Known* Hills::known(uint32_t vertex) const {
+    Known& known = known_[vertex % kKnown];
+    if (known.vertex == vertex) {
+        tests_ += known.tests;
+        return &known;
+    }
+    const uint64_t before = tests_;
+    known.vertex = vertex, known.triangle_count = known.neighbour_count = 0;
+    bool fits = true;
+    find(vertex, [&](const Triangle& corners) {
+        fits = fits && known.triangle_count < Known::kMost;
+        size_t other = 0;
+        for (const uint32_t v : corners) {
+            if (v == vertex || other == 2) continue;
+            const uint32_t place = known.place_of(v);
+            fits = fits && place < Known::kMost;
+            if (!fits) return;
+            if (place == known.neighbour_count) known.neighbours[known.neighbour_count++] = v;
+            known.triangles[known.triangle_count][other++] = static_cast<uint8_t>(place);
+        }
+        for (; other < 2; ++other) known.triangles[known.triangle_count][other] = UINT8_MAX; // a corner twice
+        ++known.triangle_count;
+    });
     known.tests = static_cast<uint32_t>(tests_ - before);
-    if (known.count > Known::kMost) known.vertex = UINT32_MAX;
+    if (fits) return &known;
+    known.vertex = UINT32_MAX, tests_ = before;
+    return nullptr;
 }
 
 uint32_t Hills::step(uint32_t vertex, const dvec3& up) const noexcept {
+    if (tests_ > most_tests_) return vertex;
     const double from = height(vertex, up);
     uint32_t top = vertex;
     double most = from;
-    triangles_at(vertex, [&](const Triangle& corners) {
-        for (const uint32_t v : corners) {
-            if (v == vertex) continue;
-            const double h = height(v, up); // of equally high ones the first by index, whatever the tree's order
-            if (h > most || (h == most && h > from && v < top)) top = v, most = h;
-        }
-    });
+    const auto look = [&](uint32_t v, double h) { // of equally high ones the first by index, whatever the tree's order
+        if (h > most || (h == most && h > from && v < top)) top = v, most = h;
+    };
+    if (const Known* const k = known(vertex))
+        for (uint32_t i = 0; i < k->neighbour_count; ++i) look(k->neighbours[i], height(k->neighbours[i], up));
+    else
+        find(vertex, [&](const Triangle& corners) {
+            for (const uint32_t v : corners)
+                if (v != vertex) look(v, height(v, up));
+        });
     return top;
 }
 
 uint32_t Hills::step(uint32_t first, uint32_t second, const dvec3& up) const noexcept {
+    if (tests_ > most_tests_) return first;
     uint32_t top = first;
     double most = std::max(height(first, up), height(second, up));
-    triangles_at(first, [&](const Triangle& corners) {
-        if (std::find(corners.begin(), corners.end(), second) == corners.end()) return;
-        for (const uint32_t v : corners)
-            if (v != first && v != second && height(v, up) > most) top = v, most = height(v, up);
-    });
+    const auto look = [&](uint32_t v, double h) {
+        if (h > most) top = v, most = h;
+    };
+    if (const Known* const k = known(first)) {
+        const uint32_t edge = k->place_of(second);
+        for (uint32_t i = 0; i < k->triangle_count; ++i) {
+            const uint8_t(&others)[2] = k->triangles[i];
+            const uint32_t v = others[0] == edge ? others[1] : others[1] == edge ? others[0] : UINT8_MAX;
+            if (v < k->neighbour_count) look(k->neighbours[v], height(k->neighbours[v], up));
+        }
+    } else {
+        find(first, [&](const Triangle& corners) {
+            if (std::find(corners.begin(), corners.end(), second) == corners.end()) return;
+            for (const uint32_t v : corners)
+                if (v != first && v != second) look(v, height(v, up));
+        });
+    }
     return top;
 }
 

@@ -5,13 +5,18 @@
 // triangles lie in leaves whose boxes hold it, a few of them.
 //
 // Complexity: a step is a descent to the leaves around one vertex, about ten blocks; kClimbSteps at most. The last few
-// vertices' triangles are kept: climbs of neighbouring pairs pass the same ones.
+// vertices' triangles and neighbours are kept: climbs of neighbouring pairs pass the same ones.
 #pragma once
+
+#include "src/bytes.hpp"
+#include "src/layout.hpp"
 
 #include <prolate/tree.hpp>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace prolate::query {
@@ -23,11 +28,15 @@ class Hills {
 public:
     /// `tests` counts nodes and triangles looked at; nothing rises any more once they exceed `most_tests`.
     Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests) noexcept
-        : tree_(tree), tests_(tests), most_tests_(most_tests) {
+        : tree_(tree), vertices_(tree.raw().vertices()), scale_(tree.scale()), tests_(tests), most_tests_(most_tests) {
         for (Known& known : known_) known.vertex = UINT32_MAX;
     }
 
-    double height(uint32_t vertex, const glm::dvec3& up) const noexcept;
+    double height(uint32_t vertex, const glm::dvec3& up) const noexcept {
+        const std::byte* const at = vertices_ + size_t{vertex} * kVertexBytes; // as TreeView::vertex(), but inline
+        const glm::dvec3 p(load_le<float>(at), load_le<float>(at + 4), load_le<float>(at + 8));
+        return glm::dot(up, p) * double{scale_};
+    }
     /// The highest neighbour of a vertex along `up`, if it is higher than the vertex; else the vertex itself.
     uint32_t step(uint32_t vertex, const glm::dvec3& up) const noexcept;
     /// From an edge on, all of which is equally high: the highest third corner of its triangles, if that is higher than
@@ -35,16 +44,25 @@ public:
     uint32_t step(uint32_t first, uint32_t second, const glm::dvec3& up) const noexcept;
 
 private:
-    template <class Visit> void triangles_at(uint32_t vertex, Visit&& visit) const;
-
-    // The triangles of a vertex, and what it took to find them, which counts each time that they are asked for.
+    // The neighbours of a vertex, each once, its triangles by the places of their other corners among these, and what
+    // it took to find them, which counts each time that they are asked for.
     struct Known {
-        static constexpr uint32_t kMost = 10; // few vertices have more
-        uint32_t vertex, tests, count, triangles[kMost];
+        static constexpr uint32_t kMost = 12; // few vertices have more neighbours, or triangles
+        uint32_t vertex, tests;
+        uint8_t triangle_count, neighbour_count;
+        uint8_t triangles[kMost][2];
+        uint32_t neighbours[kMost];
+
+        uint32_t place_of(uint32_t neighbour) const noexcept; // neighbour_count: nowhere
     };
-    static constexpr uint32_t kKnown = 16;
+    static constexpr uint32_t kKnown = 24;
+
+    template <class Visit> void find(uint32_t vertex, Visit&& visit) const;
+    const Known* known(uint32_t vertex) const;
 
     const TreeView& tree_;
+    const std::byte* const vertices_;
+    const float scale_;
     uint64_t& tests_;
     const uint64_t most_tests_;
     mutable Known known_[kKnown];
