@@ -34,7 +34,7 @@ bool Patch::takes(const dvec3& normal) const noexcept {
     return glm::dot(normal, seed_) > kNormalOfPatch;
 }
 
-void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap,
+bool Patch::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap,
                 double same_point) noexcept {
     sum_ += weight * normal, weight_ += weight;
     overlap_ = std::max(overlap_, overlap);
@@ -51,12 +51,13 @@ void Patch::add(const dvec3& normal, const Candidate& candidate, double weight, 
         else
             better |= 1u << i, reach_[i] = values[i];
     }
-    if (better == 0) return;
+    if (better == 0) return false;
     const auto place = static_cast<uint8_t>(std::countr_one(others)); // there is one, for `better` has one
     kept_[place] = candidate;
     for (uint32_t i = 0; i < kSieve; ++i)
         if ((better >> i & 1) != 0) best_[i] = place;
     any_ = true;
+    return true;
 }
 
 uint32_t Patch::kept(const Candidate* (&out)[kSieve]) const noexcept {
@@ -119,7 +120,10 @@ uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) con
 void Patches::add(const dvec3& normal, const Candidate& candidate, double weight, double overlap) noexcept {
     Patch* shallowest = &patches_[0];
     for (uint32_t i = 0; i < count_; ++i) {
-        if (patches_[i].takes(normal)) return patches_[i].add(normal, candidate, weight, overlap, same_point_);
+        if (patches_[i].takes(normal)) {
+            patches_[i].add(normal, candidate, weight, overlap, same_point_);
+            return;
+        }
         if (patches_[i].depth() < shallowest->depth()) shallowest = &patches_[i];
     }
     if (count_ < kMost)

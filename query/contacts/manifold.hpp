@@ -17,6 +17,7 @@
 #include <glm/vec3.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 
@@ -47,19 +48,38 @@ public:
     bool takes(const glm::dvec3& normal) const noexcept;
     /// `weight`: of the normal in the mean. `overlap`: what separates the bodies here, along the normal. Points nearer
     /// to each other than `same_point` count as one.
-    void add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
+    /// True if the candidate takes a place.
+    bool add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
              double same_point) noexcept;
+    /// The directions that points are the farthest along, and against.
+    std::array<glm::dvec3, 4> directions() const noexcept {
+        constexpr double kDiagonal = 0.7071067811865476;
+        return {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
+    }
+    /// What takes a place if it is above: depth (0), or how far out along (1 ... 4) and against (5 ... 8) directions().
+    double least(uint32_t place, double same_point) const noexcept {
+        return reach_[place] + (place == 0 ? std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point) : same_point);
+    }
+    /// May a point of this depth take a place, were it known of the last query? All may, as long as there are none.
+    bool may_take(const glm::dvec3& middle, double depth, double same_point) const noexcept {
+        const double x = glm::dot(x_, middle), y = glm::dot(y_, middle);
+        constexpr double kDiagonal = 0.7071067811865476;
+        const double values[] = {
+            depth, x, y, kDiagonal * (x + y), kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y), kDiagonal * (y - x)};
+        bool may = !any_;
+        for (uint32_t i = 0; i < kSieve; ++i) may = may || values[i] > reach_[i] - same_point;
+        return may;
+    }
     /// By how much a point that is no deeper than `depth`, and along each direction d within extent(d), may be deeper
     /// than the deepest, by more than 1 % or a tenth of same_point, or lie farther out than all, by more than
     /// same_point and than this share of the extent that they have. Not above 0: it takes no place. Ask only if there
     /// are points.
     template <class ExtentAlong>
     double gain(double depth, double same_point, double share, ExtentAlong&& extent) const noexcept {
-        constexpr double kDiagonal = 0.7071067811865476;
-        const glm::dvec3 directions[] = {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
-        double most = depth - reach_[0] - std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point);
+        const std::array<glm::dvec3, 4> ways = directions();
+        double most = depth - least(0, same_point);
         for (uint32_t i = 0; i < 4; ++i) {
-            const Extent along = extent(directions[i]);
+            const Extent along = extent(ways[i]);
             const double same = std::max(same_point, share * (reach_[1 + i] + reach_[5 + i]));
             most = std::max(most, std::max(along.high - reach_[1 + i], -along.low - reach_[5 + i]) - same);
         }

@@ -19,7 +19,9 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 namespace prolate {
 namespace query {
@@ -39,7 +41,9 @@ constexpr uint32_t kFewCorners = 64; // all of which cost less than the blocks o
 class Touching {
 public:
     Touching(HeightSearch& search, double margin, const LastContacts& last)
-        : s_(search), last_(last), touched_(moved(search.shape, margin)),
+        : s_(search), last_(last), touched_(moved(search.shape, margin)), surely_(kSeparationMargin * touched_.reach),
+          highest_(kSeparationMargin *
+                   (2 * place(search.side.tree.root_bound(), search.side.tree.scale()).reach + touched_.reach)),
           same_point(kSamePoint * place(search.side.tree.root(), search.side.tree.scale()).size),
           patch(-search.shape.normal) {
         std::fill(std::begin(seen_), std::end(seen_), kNoTriangle);
@@ -48,12 +52,16 @@ public:
         s_.wanted = [](void* self, uint32_t slot, double bound) {
             return static_cast<Touching*>(self)->wanted(slot, bound);
         };
+        s_.outline = &outline_;
     }
 
 private:
     HeightSearch& s_;
     const LastContacts& last_;
     const PlacedHalfSpace touched_; // blown up by the margin
+    // A triangle touches if a corner is no higher than kSeparationMargin (reach of the triangle, and of the plane): up
+    // to here all do, whatever the triangle, and above this none.
+    const double surely_, highest_;
 
 public:
     const double same_point;
@@ -61,6 +69,8 @@ public:
     uint64_t found = 0;
     bool meets = false;
 
+    /// Corners that are higher over the plane than this and the margin do not touch.
+    double highest() const { return 2 * highest_; }
     /// All of them, if the body is a mesh of few corners: in the order of its triangles. False, and nothing is done, if
     /// it is not, the budget does not suffice, or rounding leaves open which corners touch.
     bool take_all() {
@@ -70,15 +80,9 @@ public:
             triangles > s_.left())
             return false;
         dvec3 at[kFewCorners];
-        double over[kFewCorners], farthest = 0;
-        for (uint32_t v = 0; v < corners; ++v) {
-            at[v] = position(tree, v), over[v] = height(at[v], touched_);
-            farthest = std::max(farthest, glm::dot(at[v], at[v]));
-        }
-        // A triangle touches if a corner is no higher than kSeparationMargin (reach of the triangle, and of the plane).
-        const double surely = kSeparationMargin * touched_.reach,
-                     perhaps = kSeparationMargin * (2 * std::sqrt(farthest) + touched_.reach);
-        const auto open = [&](double height) { return height > surely && height <= perhaps; };
+        double over[kFewCorners];
+        for (uint32_t v = 0; v < corners; ++v) at[v] = position(tree, v), over[v] = height(at[v], touched_);
+        const auto open = [&](double height) { return height > surely_ && height <= highest_; };
         if (std::any_of(over, over + corners, open)) return false;
         s_.stats.triangle_tests += triangles;
         uint64_t seen = 0;
@@ -86,7 +90,7 @@ public:
             for (const uint32_t v : tree.triangle(t)) {
                 if ((seen >> v & 1) != 0) continue;
                 seen |= uint64_t{1} << v;
-                if (over[v] <= surely) add(at[v], {Part::Kind::vertex, v, 0});
+                if (over[v] <= surely_) add(at[v], {Part::Kind::vertex, v, 0});
             }
         return true;
     }
@@ -102,32 +106,54 @@ private:
             if (!separated(e, touched_)) add(lowest_point(e, s_.shape.normal), {Part::Kind::node, slot, 0});
         }
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
-            const PlacedTriangle triangle = place(tree, t);
-            if (separated(triangle, touched_)) continue;
             const Triangle corners = tree.triangle(t);
-            const double rounding = kSeparationMargin * (triangle.reach + touched_.reach);
-            for (size_t k = 0; k < 3; ++k)
-                if (uint32_t& seen = seen_[corners[k] % std::size(seen_)];
-                    seen != corners[k] && height(triangle.corner[k], touched_) <= rounding) {
-                    seen = corners[k];
-                    add(triangle.corner[k], {Part::Kind::vertex, corners[k], 0});
+            std::optional<double> rounding; // of the triangle, if it matters
+            for (const uint32_t v : corners) {
+                uint32_t& seen = seen_[v % std::size(seen_)];
+                if (seen == v) continue;
+                const dvec3 p = position(tree, v);
+                const double over = height(p, touched_);
+                if (over > highest_) continue;
+                if (over > surely_) {
+                    if (!rounding) rounding = kSeparationMargin * (place(tree, t).reach + touched_.reach);
+                    if (over > *rounding) continue;
                 }
+                seen = v;
+                add(p, {Part::Kind::vertex, v, 0});
+            }
         }
         return true;
     }
     void add(const dvec3& p, const Part& part) {
         const double depth = -height(p, s_.shape);
+        ++found, meets = true;
+        if (!patch.may_take(p, depth, same_point)) return;
         const uint64_t id = id_of(part, {Part::Kind::face, 0, 0});
         const dvec3 n = -s_.shape.normal;
-        ++found, meets = true;
-        patch.add(n,
-                  {.middle = p - 0.5 * depth * n,
-                   .depth = depth,
-                   .id = id,
-                   .known = last_.knows(id, n),
-                   .normal = n,
-                   .pair = {}},
-                  1, depth, same_point);
+        const bool takes = patch.add(n,
+                                     {.middle = p - 0.5 * depth * n,
+                                      .depth = depth,
+                                      .id = id,
+                                      .known = last_.knows(id, n),
+                                      .normal = n,
+                                      .pair = {}},
+                                     1, depth, same_point);
+        if (takes) know();
+    }
+    // Tells the traversal what the patch has.
+    void know() {
+        const LatticeInfo& lattice = s_.side.lattice;
+        const double per_step = steps_per_metre(lattice);
+        const std::array<dvec3, 4> directions = patch.directions();
+        outline_.below = static_cast<float>(patch.least(0, same_point) * per_step);
+        for (uint32_t i = 0; i < 4; ++i) {
+            const dvec3& d = directions[i];
+            const double origin = d.x * lattice.origin[0] + d.y * lattice.origin[1] + d.z * lattice.origin[2];
+            for (glm::length_t k = 0; k < 3; ++k) outline_.directions[i][k] = static_cast<float>(d[k]);
+            outline_.beyond[i] = static_cast<float>(patch.least(1 + i, same_point) * per_step - origin);
+            outline_.beyond[4 + i] = static_cast<float>(patch.least(5 + i, same_point) * per_step + origin);
+        }
+        ++outline_.version;
     }
     bool wanted(uint32_t slot, double bound) const {
         if (patch.empty()) return true;
@@ -139,6 +165,7 @@ private:
         return patch.gain(-bound, same_point, 0, extent) > 0;
     }
 
+    HeightOutline outline_;
     uint32_t seen_[16]; // corners that were added last: most belong to several triangles
 };
 
@@ -210,8 +237,7 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
     query::HeightSearch search(tree, shape, context, options);
     query::Touching touching(search, options.margin, last);
     if (!touching.take_all()) {
-        const double reach = shape.reach + query::place(tree.root_bound(), tree.scale()).reach;
-        search.limit = options.margin + query::kSeparationMargin * reach * 4;
+        search.limit = options.margin + touching.highest();
         query::traverse(search);
     }
     out.found = touching.found;

@@ -1,4 +1,5 @@
-// A half-space against a tree: eight children at a time, the lowest first.
+// A half-space against a tree: eight children at a time, the lowest first; for contacts, those that may lie farthest
+// beyond what is known.
 //
 // With n the half-space's normal, a node is no lower than its ellipsoid, n.c - |L^T n|, and no lower than its box: the
 // greater of both bounds counts.
@@ -19,6 +20,7 @@
 #include "query/node/lanes-inl.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 HWY_BEFORE_NAMESPACE();
@@ -36,8 +38,9 @@ public:
         if (!test(0, 1)) return stop(-HUGE_VAL);
         while (size_ > 0) {
             const Entry e = stack_[--size_];
-            const double bound = metres(e.bound);
-            if (bound > s_.limit || (s_.wanted != nullptr && !s_.wanted(s_.user, e.node_a, bound))) continue;
+            const double bound = height(e);
+            if (bound > s_.limit) continue;
+            if (s_.wanted != nullptr && e.flags != version() && !s_.wanted(s_.user, e.node_a, bound)) continue;
             const std::byte* const block = s_.side.block(e.node_a);
             const uint32_t lane = e.node_a % kBlockLanes;
             if ((s_.side.leaf_lanes(e.node_a - lane, block) >> lane & 1) != 0 || e.node_a >= s_.side.limit_from) {
@@ -51,15 +54,21 @@ public:
     }
 
 private:
+    // An entry has the bound of a node's height in node_b, what it is sorted by in `bound`, and the version of the
+    // outline that this is from in `flags`.
     double metres(float steps) const { return double{steps} * step_; }
+    double height(const Entry& e) const { return metres(std::bit_cast<float>(e.node_b)); }
+    uint32_t version() const { return s_.outline != nullptr ? s_.outline->version : 0; }
 
     void stop(double here) {
         s_.open = here;
-        for (uint32_t i = 0; i < size_; ++i) s_.open = std::min(s_.open, metres(stack_[i].bound));
+        for (uint32_t i = 0; i < size_; ++i) s_.open = std::min(s_.open, height(stack_[i]));
     }
 
-    // Lower bounds of heights, steps; NaN, which claims nothing, becomes the lowest.
-    HWY_INLINE void heights(const std::byte* block, float (&out)[kBlockLanes]) const {
+    // Lower bounds of heights, steps; NaN, which claims nothing, becomes the lowest. And how far the lanes may be
+    // beyond the outline, if there is one.
+    template <bool kOutline>
+    HWY_INLINE void bounds(const std::byte* block, float (&heights)[kBlockLanes], float (&gains)[kBlockLanes]) const {
         const BlockBoxes boxes(block);
         const LaneHalfSpace& h = s_.lanes;
         for (size_t first = 0; first < kBlockLanes; first += kFloatLanes) {
@@ -68,30 +77,56 @@ private:
             const Float size = sqrt(trace(shape_of(e.factor)));
             const Float ellipsoid = dot(n, e.center) - h.offset - width(e, n) - (h.slack + kLaneMargin * size);
             Float box = set(0), moduli = set(0);
+            const auto side = [&](size_t array, size_t i) {
+                return box_sides(block, array, i, first) * boxes.step(i) + static_cast<float>(boxes.origin(i));
+            };
             for (size_t i = 0; i < 3; ++i) {
-                const Float side = box_sides(block, h.normal[i] < 0 ? kBlockBoxHigh : kBlockBoxLow, i, first);
-                const Float at = (side * boxes.step(i) + static_cast<float>(boxes.origin(i))) * h.normal[i];
+                const Float at = side(h.normal[i] < 0 ? kBlockBoxHigh : kBlockBoxLow, i) * h.normal[i];
                 box = box + at, moduli = moduli + abs(at);
             }
             box = box - h.offset - (h.slack + kLaneMargin * moduli);
             const Float bound = greater(ellipsoid, box);
-            store(choose(bound == bound, bound, set(-HUGE_VALF)), out + first);
+            store(choose(bound == bound, bound, set(-HUGE_VALF)), heights + first);
+            if constexpr (kOutline) store(gain(e, side, bound), gains + first);
         }
+    }
+    // The ellipsoid and the box each bound how far out a lane reaches.
+    template <class Side> HWY_INLINE Float gain(const LaneNodes& e, Side&& side, Float bound) const {
+        const HeightOutline& known = *s_.outline;
+        const Float3 low{side(kBlockBoxLow, 0), side(kBlockBoxLow, 1), side(kBlockBoxLow, 2)},
+            high{side(kBlockBoxHigh, 0), side(kBlockBoxHigh, 1), side(kBlockBoxHigh, 2)};
+        Float most = -bound - known.below;
+        for (size_t k = 0; k < 4; ++k) {
+            const float(&d)[3] = known.directions[k];
+            const Float middle = dot(set(d), e.center), half = width(e, set(d));
+            const Float3 from{low.x * d[0], low.y * d[1], low.z * d[2]},
+                to{high.x * d[0], high.y * d[1], high.z * d[2]};
+            const Float farthest = max(from.x, to.x) + max(from.y, to.y) + max(from.z, to.z),
+                        nearest = min(from.x, to.x) + min(from.y, to.y) + min(from.z, to.z);
+            most = max(most, max(min(farthest, middle + half) - known.beyond[k],
+                                 min(-nearest, half - middle) - known.beyond[4 + k]));
+        }
+        return most;
     }
 
     bool test(uint32_t first, uint32_t count) {
         if (count > s_.left()) return false;
         s_.stats.pair_tests += count, ++s_.stats.block_tests;
         s_.side.deepest = std::max(s_.side.deepest, first + count - 1);
-        alignas(32) float bounds[kBlockLanes];
-        heights(s_.side.block(first), bounds);
+        alignas(32) float heights[kBlockLanes], gains[kBlockLanes];
+        const uint32_t of = version();
+        const std::byte* const block = s_.side.block(first);
+        if (of != 0)
+            bounds<true>(block, heights, gains);
+        else
+            bounds<false>(block, heights, gains);
         const uint32_t base = size_;
         for (uint32_t lane = 0; lane < count; ++lane) {
-            const float bound = bounds[lane];
-            if (metres(bound) > s_.limit) continue;
+            if (metres(heights[lane]) > s_.limit || (of != 0 && gains[lane] <= 0)) continue;
+            const float key = of != 0 ? -gains[lane] : heights[lane];
             uint32_t at = size_++;
-            for (; at > base && stack_[at - 1].bound < bound; --at) stack_[at] = stack_[at - 1];
-            stack_[at] = {first + lane, 0, bound, 0};
+            for (; at > base && stack_[at - 1].bound < key; --at) stack_[at] = stack_[at - 1];
+            stack_[at] = {first + lane, std::bit_cast<uint32_t>(heights[lane]), key, of};
         }
         return true;
     }

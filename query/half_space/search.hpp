@@ -14,6 +14,15 @@
 
 namespace prolate::query {
 
+/// What is known of contacts: nodes are of interest that may reach farther out along the plane, or lie lower. In the
+/// tree's lattice coordinates, from the lattice's origin on.
+struct HeightOutline {
+    float directions[4][3]; ///< of length 1
+    float beyond[8];        ///< along these, and then against them
+    float below;            ///< height over the plane
+    uint32_t version = 0;   ///< of these numbers; 0: nothing is known
+};
+
 struct HeightSearch {
     TreeSide side;
     const PlacedHalfSpace shape;
@@ -27,7 +36,11 @@ struct HeightSearch {
 
     /// Called for each leaf that is not higher than `limit`, which it may lower. False ends the search.
     bool (*leaf)(void* user, uint32_t slot) = nullptr;
-    /// Called for each node that is no lower than `bound`, metres: need it be looked at? Null: always.
+    /// Nodes that are not of interest are passed over, others are looked at in the order of how far beyond it they may
+    /// be. Null: in that of their heights.
+    const HeightOutline* outline = nullptr;
+    /// Called for nodes that were of interest to an outline before: are they still? They are no lower than `bound`,
+    /// metres. Null: always.
     bool (*wanted)(void* user, uint32_t slot, double bound) = nullptr;
     void* user = nullptr;
 
@@ -39,7 +52,7 @@ struct HeightSearch {
     uint64_t left() const noexcept { return tests_left(max_tests, stats.tests()); }
 };
 
-/// Leaves in rising order of the bounds of their heights, roughly.
+/// Calls `leaf` for the leaves.
 void traverse(HeightSearch& search) noexcept;
 
 } // namespace prolate::query

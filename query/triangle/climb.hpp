@@ -8,15 +8,13 @@
 // vertices' triangles and neighbours are kept: climbs of neighbouring pairs pass the same ones.
 #pragma once
 
-#include "src/bytes.hpp"
-#include "src/layout.hpp"
+#include "query/triangle/placed.hpp"
 
 #include <prolate/tree.hpp>
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include <cstddef>
 #include <cstdint>
 
 namespace prolate::query {
@@ -28,14 +26,12 @@ class Hills {
 public:
     /// `tests` counts nodes and triangles looked at; nothing rises any more once they exceed `most_tests`.
     Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests) noexcept
-        : tree_(tree), vertices_(tree.raw().vertices()), scale_(tree.scale()), tests_(tests), most_tests_(most_tests) {
+        : tree_(tree), tests_(tests), most_tests_(most_tests) {
         for (Known& known : known_) known.vertex = UINT32_MAX;
     }
 
     double height(uint32_t vertex, const glm::dvec3& up) const noexcept {
-        const std::byte* const at = vertices_ + size_t{vertex} * kVertexBytes; // as TreeView::vertex(), but inline
-        const glm::dvec3 p(load_le<float>(at), load_le<float>(at + 4), load_le<float>(at + 8));
-        return glm::dot(up, p) * double{scale_};
+        return glm::dot(up, stored_vertex(tree_, vertex)) * double{tree_.scale()};
     }
     /// The highest neighbour of a vertex along `up`, if it is higher than the vertex; else the vertex itself.
     uint32_t step(uint32_t vertex, const glm::dvec3& up) const noexcept;
@@ -61,8 +57,6 @@ private:
     const Known* known(uint32_t vertex) const;
 
     const TreeView& tree_;
-    const std::byte* const vertices_;
-    const float scale_;
     uint64_t& tests_;
     const uint64_t most_tests_;
     mutable Known known_[kKnown];

@@ -3,16 +3,24 @@
 #pragma once
 
 #include "query/ellipsoid/placed.hpp"
+#include "src/bytes.hpp"
+#include "src/layout.hpp"
 
 #include <prolate/tree.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace prolate::query {
 
+/// TreeView::vertex(), inline.
+inline glm::dvec3 stored_vertex(const TreeView& tree, uint32_t vertex) {
+    const std::byte* const at = tree.raw().vertices() + size_t{vertex} * kVertexBytes;
+    return {load_le<float>(at), load_le<float>(at + 4), load_le<float>(at + 8)};
+}
 /// A vertex as queries see it, metres: exact, whatever the tree's scale.
 inline glm::dvec3 position(const TreeView& tree, uint32_t vertex) {
-    return to_double(tree.vertex(vertex)) * double{tree.scale()};
+    return stored_vertex(tree, vertex) * double{tree.scale()};
 }
 
 /// A triangle placed in A's frame.
