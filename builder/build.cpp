@@ -9,14 +9,14 @@
 #include "builder/grow.hpp"
 #include "builder/hausdorff.hpp"
 #include "builder/hulls.hpp"
+#include "builder/inner.hpp"
 #include "builder/job.hpp"
 #include "builder/mass.hpp"
+#include "builder/mesh.hpp"
 #include "builder/options.hpp"
 #include "builder/resolution.hpp"
 
 #include "src/format.hpp"
-
-#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <chrono>
@@ -55,7 +55,7 @@ private:
         mesh_ = source_.mesh.view();
         source_hash_ = hash(mesh_);
         for (const Vec3& v : mesh_.vertices) box_.add(to_vec(v));
-        if (auto possible = check_lengths(options_, box_.size()); !possible) return possible.error();
+        if (auto possible = check_asked(options_, box_.size(), closed()); !possible) return possible.error();
         return options_.exact ? bake_exact() : bake_ellipsoids();
     }
 
@@ -86,8 +86,8 @@ private:
         if (auto packed = pack(grown, pieces, levels); !packed) return packed.error();
         std::vector<LevelReport> figures = measure(grown, columns, winding, levels);
         const bool reached = grown.goal_reached && (!passages_ || hole_radius_ >= double{options_.keep_holes});
-        return finish(Tree::open(format::encode(describe(reached), options_.degree, lattice_, levels)),
-                      std::move(figures), reached);
+        return finish(format::encode(describe(reached), options_.degree, lattice_, levels), std::move(figures),
+                      reached);
     }
 
     // Split the triangles, bound them, prove.
@@ -112,10 +112,18 @@ private:
         std::vector<LevelReport> figures(grown->levels.size()); // of a cover of the surface alone: none but these
         for (uint32_t l = 0; l < figures.size(); ++l)
             without_hulls->for_each_in_cut(l, [&](uint32_t) { ++figures[l].nodes; });
-        return finish(Tree::open(std::move(bytes)), std::move(figures), true);
+        return finish(std::move(bytes), std::move(figures), true);
     }
 
-    Result<Build> finish(Result<Tree> tree, std::vector<LevelReport> figures, bool goal_reached) {
+    // Append what follows the tree, prove.
+    Result<Build> finish(std::vector<std::byte> bytes, std::vector<LevelReport> figures, bool goal_reached) {
+        const auto progress = [this](double) { report("inner", 0.85, 0); };
+        if (options_.inner > 0)
+            if (auto added = append_inner_cover(bytes, mesh_, describe(goal_reached),
+                                                {options_.inner, options_.degree, report_.weld_distance, progress});
+                !added)
+                return added.error();
+        auto tree = Tree::open(std::move(bytes));
         if (!tree) return tree.error();
         for (uint32_t l = 0; l < figures.size(); ++l) figures[l].bytes = tree->view().level(l).end_byte;
         if (auto proved = prove(tree->view(), figures); !proved) return proved.error();
@@ -178,14 +186,6 @@ private:
         return progress_(reached);
     }
 
-    double surface_area() const {
-        double area = 0;
-        for (const Triangle& t : mesh_.triangles) {
-            const Vec a = to_vec(mesh_.vertices[t[0]]);
-            area += 0.5 * (to_vec(mesh_.vertices[t[1]]) - a).cross(to_vec(mesh_.vertices[t[2]]) - a).norm();
-        }
-        return area;
-    }
     double distance_tolerance() const { return effort_.distance_tolerance * box_.size().norm(); }
     double min_radius() const {
         const double farthest = std::max(box_.low.cwiseAbs().maxCoeff(), box_.high.cwiseAbs().maxCoeff());
@@ -210,7 +210,7 @@ private:
                           .cells = cells,
                           .field = field,
                           .columns = columns,
-                          .area = surface_area(),
+                          .area = surface_area(mesh_),
                           .outside = options_.method == Method::analytic ? decltype(Solid::outside)(exact) : nullptr,
                           .distance = distance};
         const auto progress = [this](double done, uint32_t nodes) { report("fit", 0.05 + 0.75 * done, nodes); };
@@ -344,9 +344,10 @@ private:
         const auto start = Clock::now();
         const auto proof = verify(tree, source_.mesh.view(), options);
         if (!proof) return proof.error();
-        if (!proof->bounded)
-            return Error{ErrorCode::internal, "a bounding volume could not be proved; please report this mesh",
-                         proof->unbounded_node};
+        if (!proof->bounded || !proof->inner_inside)
+            return Error{ErrorCode::internal,
+                         "a bounding volume or an inner ellipsoid could not be proved; please report this mesh",
+                         proof->bounded ? proof->protruding_node : proof->unbounded_node};
         uint64_t pieces = 0;
         for (const LevelProof& level : proof->levels) pieces += level.pieces;
         for (size_t l = 0; l < figures.size(); ++l) {

@@ -14,12 +14,15 @@
 // Known limit: duplicated triangles stay.
 #include "builder/mesh.hpp"
 
+#include "builder/eigen.hpp"
 #include "builder/job.hpp"
 #include "builder/shells.hpp"
 
 #include "src/hash.hpp"
 
 #include <prolate/tree.hpp>
+
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <bit>
@@ -301,6 +304,15 @@ Result<void> check_mesh(MeshView mesh) {
     if (std::hypot(size[0], size[1], size[2]) < kSmallest)
         return Error{ErrorCode::bad_mesh, "the mesh is less than 1e-24 m across; give it in another unit"};
     return {};
+}
+
+double surface_area(MeshView mesh) {
+    double area = 0;
+    for (const Triangle& t : mesh.triangles) {
+        const Vec a = to_vec(mesh.vertices[t[0]]);
+        area += 0.5 * (to_vec(mesh.vertices[t[1]]) - a).cross(to_vec(mesh.vertices[t[2]]) - a).norm();
+    }
+    return area;
 }
 
 Result<CleanMesh> clean(MeshView mesh, float weld, const std::function<bool()>& go_on) {

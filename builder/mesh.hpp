@@ -1,4 +1,4 @@
-// What a mesh must be for clean() to take it.
+// What a mesh must be for clean() to take it, and how large its surface is.
 #pragma once
 
 #include <prolate/mesh.hpp>
@@ -7,5 +7,8 @@ namespace prolate {
 
 /// Fails with bad_mesh, for what clean() says. O(n).
 Result<void> check_mesh(MeshView mesh);
+
+/// Sum of the triangles' areas, square metres. O(n).
+double surface_area(MeshView mesh);
 
 } // namespace prolate

@@ -38,6 +38,7 @@ Result<void> validate(const BuildOptions& o) {
         return bad("an exact tree holds the mesh's triangles: it cannot fill what is between", 0);
     if (o.exact && o.primitive != Primitive::ellipsoid)
         return bad("an exact tree is made of ellipsoids", static_cast<uint64_t>(o.primitive));
+    if (o.inner > 65536) return bad("inner ellipsoids must be 1 to 65536", o.inner);
     if (o.leaf_triangles < 1 || o.leaf_triangles > kMaxLeafTriangles)
         return bad("triangles in a leaf must be 1 to 127", o.leaf_triangles);
     if (!std::isfinite(o.weld)) return bad("the weld tolerance must be a length", 0);
@@ -58,7 +59,10 @@ double most_distance(const BuildOptions& o, double diagonal) noexcept {
     return std::min(o.distance > 0 ? share : HUGE_VAL, o.clearance > 0 ? double{o.clearance} : HUGE_VAL);
 }
 
-Result<void> check_lengths(const BuildOptions& o, const Vec& sides) {
+Result<void> check_asked(const BuildOptions& o, const Vec& sides, bool closed) {
+    if (o.inner > 0 && !closed)
+        return Error{ErrorCode::bad_mesh,
+                     "an open mesh has no inside for an inner cover; close it, or fill it, or bake without", 0};
     const double diagonal = sides.norm();
     if (most_distance(o, diagonal) < least_clearance(diagonal, o.quality) * (1 - 1e-6))
         return Error{ErrorCode::bad_options,
@@ -82,12 +86,13 @@ uint64_t hash(const BuildOptions& o) {
         store_le(to, value);
         to += sizeof value;
     };
-    put(kBuilderVersion), put(uint32_t{kFormatVersion});
+    put(kBuilderVersion), put(uint32_t{o.inner > 0 ? kFormatVersion : kPlainFormatVersion});
     put(o.degree), put(o.levels), put(o.ellipsoids), put(o.tolerance), put(o.distance), put(o.clearance),
         put(o.keep_holes), put(o.fill);
     put(o.alpha), put(o.beta), put(o.seed), put(o.weld);
     put(static_cast<uint8_t>(o.method)), put(static_cast<uint8_t>(o.primitive)), put(static_cast<uint8_t>(o.quality));
     put(static_cast<uint8_t>(o.exact ? o.leaf_triangles : 0));
+    put(o.inner);
     return hash_bytes(bytes);
 }
 

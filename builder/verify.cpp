@@ -29,6 +29,7 @@
 #include "builder/prover.hpp"
 #include "builder/verify_bounding.hpp"
 #include "builder/verify_exact.hpp"
+#include "builder/verify_inner.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -133,6 +134,7 @@ Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::f
 
     VerifyReport report;
     report.surface_mode = !cleaned->report.closed && info.fill == 0;
+    if (const auto inner = tree.inner()) verify_inner(*inner, surface, cleaned->report.weld_distance, report);
     if (tree.has_triangles()) {
         verify_exact(tree, surface, report);
         return report;
@@ -185,10 +187,12 @@ Result<VerifyReport> verify(const TreeView& tree, MeshView mesh, const VerifyOpt
     Job job(options.threads, go_on);
     try {
         return job.run([&] {
-            return prove_all(tree, mesh, [&](double fraction) {
+            auto report = prove_all(tree, mesh, [&](double fraction) {
                 done = fraction;
                 job.ask();
             });
+            if (report) report->covered = report->covered && report->inner_inside;
+            return report;
         });
     } catch (const Cancelled&) {
         return Error{ErrorCode::cancelled, "cancelled", 0};

@@ -10,6 +10,7 @@
 #include <prolate/prolate.h>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
+#include <prolate/solids.hpp>
 #include <prolate/sweep.hpp>
 
 using namespace prolate;
@@ -132,6 +133,34 @@ prolate_status prolate_distance(prolate_body a, prolate_body b, void* scratch, s
     write(result_of(distance(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
                              capi::options_of(given))),
           result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_collide_solids(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                      const prolate_query_options* options, prolate_solids_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    const QueryOptions limits = capi::options_of(given);
+    const SolidsResult r = collide_solids(
+        call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
+        {.max_level = limits.max_level, .max_pair_tests = limits.max_pair_tests, .margin = limits.margin});
+    auto out = fresh<prolate_solids_result>();
+    out.verdict = verdict_of(r.verdict), out.out_of_budget = r.out_of_budget, out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_distance_solids(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                       const prolate_distance_options* options, prolate_solids_distance* result) {
+    auto given = fresh<prolate_distance_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    const SolidsDistance r = distance_solids(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
+                                             capi::options_of(given));
+    auto out = fresh<prolate_solids_distance>();
+    out.verdict = verdict_of(r.verdict), out.lower = r.lower, out.upper = r.upper, out.stats = stats_of(r.stats);
+    write(out, result);
     return PROLATE_OK;
 }
 

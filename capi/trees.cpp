@@ -132,6 +132,22 @@ prolate_status prolate_tree_round(const prolate_tree* tree, float radius, prolat
     return PROLATE_OK;
 }
 
+prolate_status prolate_tree_coarser(const prolate_tree* tree, uint32_t last, prolate_tree* coarser) {
+    const TreeView* const view = view_of(tree);
+    if (view == nullptr || coarser == nullptr) return PROLATE_BAD_ARGUMENT;
+    hold(view->coarser(last), coarser);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_tree_inner(const prolate_tree* tree, prolate_tree* inner) {
+    const TreeView* const view = view_of(tree);
+    if (view == nullptr || inner == nullptr) return PROLATE_BAD_ARGUMENT;
+    const auto found = view->inner();
+    if (!found) return PROLATE_UNSUPPORTED;
+    hold(*found, inner);
+    return PROLATE_OK;
+}
+
 prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info* info) {
     const TreeView* const view = view_of(tree);
     if (view == nullptr || info == nullptr) return PROLATE_BAD_ARGUMENT;
@@ -147,6 +163,7 @@ prolate_status prolate_tree_describe(const prolate_tree* tree, prolate_tree_info
     std::copy(bake.mass.inertia.begin(), bake.mass.inertia.end(), out.inertia);
     out.volume_error = bake.mass.volume_error, out.center_error = bake.mass.center_error;
     out.inertia_error = bake.mass.inertia_error;
+    if (const auto inner = view->inner()) out.inner_nodes = inner->node_count();
     write(out, info);
     return PROLATE_OK;
 }

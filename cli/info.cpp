@@ -16,6 +16,8 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <string>
+#include <vector>
 
 namespace prolate::cli {
 namespace {
@@ -31,11 +33,23 @@ struct InfoArguments {
     bool json = false;
 };
 
+// Kinds of sections that this version makes nothing of.
+std::vector<std::string> unknown_sections(const TreeView& tree) {
+    std::vector<std::string> out;
+    for (uint32_t s = 0; s < tree.section_count(); ++s) {
+        const Section section = tree.section(s);
+        if (const std::string kind(section.kind, sizeof section.kind); kind != "INNR") out.push_back(kind);
+    }
+    return out;
+}
+
 std::string as_json(const TreeView& tree) {
     nlohmann::ordered_json out;
-    out["format_version"] = kFormatVersion; // the only one that opens
+    out["format_version"] = tree.format_version();
     out["is_prefix"] = tree.is_prefix();
     out.update(header_json(tree));
+    out["unknown_sections"] = nlohmann::ordered_json::array();
+    for (const std::string& kind : unknown_sections(tree)) out["unknown_sections"].push_back(kind);
     out["levels"] = nlohmann::ordered_json::array();
     for (uint32_t l = 0; l < tree.level_count(); ++l) {
         const LevelInfo level = tree.level(l);
@@ -74,8 +88,8 @@ std::string mass_text(const MassProperties& mass) {
 
 std::string as_text(const std::string& name, const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
-    std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", visible(name), kFormatVersion,
-                                  grouped(tree.bytes().size()));
+    std::string out = fmt::format("{}: ellipsoid tree, format version {}, {} bytes\n", visible(name),
+                                  tree.format_version(), grouped(tree.bytes().size()));
     if (tree.is_prefix()) out += "  a prefix of a longer file: a coarser tree\n";
     out += fmt::format("  nodes     {} in {} levels, degree {}; {} blocks, {:.1f} bytes a node\n",
                        grouped(tree.node_count()), tree.level_count(), tree.degree(), grouped(tree.block_count()),
@@ -118,6 +132,9 @@ std::string as_text(const std::string& name, const TreeView& tree) {
                            0.01 * double{info.distance} * info.diagonal);
     if (info.keep_holes > 0) out += fmt::format("  asked     holes free for a ball of radius {:g}\n", info.keep_holes);
     if (!info.goal_reached) out += "  missed    what was asked could not be met at this resolution\n";
+    out += inner_text(tree);
+    for (const std::string& kind : unknown_sections(tree))
+        out += fmt::format("  skipped   a section {}, which this version does not know\n", kind);
     out += fmt::format("  hashes    source {:016x}, options {:016x}\n", info.source_hash, info.options_hash);
     out += level_table(tree);
     return out;

@@ -88,6 +88,28 @@ nlohmann::ordered_json level_json(const TreeView& tree, uint32_t l) {
             {"covered", info.proved}};
 }
 
+nlohmann::ordered_json inner_json(const TreeView& tree) {
+    const auto inner = tree.inner();
+    if (!inner) return nullptr;
+    const uint32_t last = inner->level_count() - 1;
+    const double volume = inner->level(last).union_volume;
+    return {{"ellipsoids", cut_size(*inner, last)},
+            {"levels", inner->level_count()},
+            {"bytes", inner->bytes().size()},
+            {"union_volume", volume},
+            {"share_of_solid", shortest(volume / inner->bake_info().solid_volume)}};
+}
+
+std::string inner_text(const TreeView& tree) {
+    const auto inner = tree.inner();
+    if (!inner) return "";
+    const uint32_t last = inner->level_count() - 1;
+    return fmt::format("  inside    {} ellipsoids in {} levels, {:.1f} % of the solid; proved; {} bytes\n",
+                       grouped(cut_size(*inner, last)), inner->level_count(),
+                       100 * inner->level(last).union_volume / inner->bake_info().solid_volume,
+                       grouped(inner->bytes().size()));
+}
+
 nlohmann::ordered_json header_json(const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
     nlohmann::ordered_json out;
@@ -127,6 +149,7 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["origin"] = info.placement.origin;
     out["weld"] = info.weld < 0 ? nlohmann::ordered_json("default") : nlohmann::ordered_json(shortest(info.weld));
     out["resolution"] = info.resolution;
+    out["inner"] = inner_json(tree);
     return out;
 }
 

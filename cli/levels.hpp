@@ -25,7 +25,11 @@ extern const char* const kLevelTableHelp;
 /// The figures of one level's cut. Lengths as in the file, and in percent of the diagonal; null where unknown.
 nlohmann::ordered_json level_json(const TreeView& tree, uint32_t level);
 
-/// All that the header says.
+/// The inner cover in one line, or as JSON; "" or null if there is none.
+std::string inner_text(const TreeView& tree);
+nlohmann::ordered_json inner_json(const TreeView& tree);
+
+/// All that the header says, and the inner cover.
 nlohmann::ordered_json header_json(const TreeView& tree);
 
 /// Indented, with a line's end, and first of all who wrote it. A file name that is no UTF-8 is no reason to fail.

@@ -163,7 +163,7 @@ void add_render(CLI::App& app, Work& chosen) {
     command->add_option(
         "--section", a->section,
         "cut away the viewer's side of a plane across x, y or z (halfway, or at 0.4 of the extent for z,0.4), and show "
-        "the mesh's section within the tree's");
+        "the mesh's section within the tree's, and an inner cover's within the mesh's");
     command->add_flag("--heat", a->heat,
                       "colour by how far the tree sticks out of the mesh, and print the mean and the maximum, or for "
                       "open meshes the 99th percentile");

@@ -23,7 +23,8 @@ The proof uses only the tree's file and the mesh. Exit code 0: every level cover
 could not be proved. The mesh is read as when the tree was baked, with the same unit, scale, local origin and weld
 tolerance, unless you give others. An open mesh has no certain inside, so only its triangles are proved to be
 covered. Of a tree baked with --fill, the filled solid is; of one with --keep-holes, the holes are proved to be free,
-too. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it.
+too. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it. The ellipsoids of
+an inner cover (bake --inner) must lie inside the solid, or the exit code is 1.
 
 Examples:
   prolate verify horse.etree horse.obj
@@ -46,6 +47,8 @@ std::string as_json(const VerifyReport& report, bool same_mesh) {
     if (!report.bounded) out["unbounded_node"] = report.unbounded_node;
     out["holes_kept"] = report.holes_kept;
     if (!report.holes_kept) out["blocked_at"] = report.blocked;
+    out["inner_inside"] = report.has_inner ? nlohmann::ordered_json(report.inner_inside) : nullptr;
+    if (!report.inner_inside) out["protruding_node"] = report.protruding_node;
     out["baked_from_this_mesh"] = same_mesh;
     out["levels"] = nlohmann::ordered_json::array();
     for (const LevelProof& level : report.levels) {
@@ -89,6 +92,10 @@ std::string as_text(const VerifyReport& report) {
     if (!report.holes_kept)
         out += fmt::format("holes: NOT certainly free for the ball around ({:.9g}, {:.9g}, {:.9g})\n",
                            report.blocked[0], report.blocked[1], report.blocked[2]);
+    if (report.has_inner)
+        out += report.inner_inside ? "inner cover: inside the solid, proved\n"
+                                   : fmt::format("inner cover: node {} does NOT certainly lie inside the solid\n",
+                                                 report.protruding_node);
     if (report.surface_mode) out += "surface mode: the mesh is open, so the proof is about its triangles only\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;

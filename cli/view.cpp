@@ -30,6 +30,8 @@ with the tree, and how far the ellipsoids stick out of it; an exact tree brings 
 file that needs no network and no server, and sends nothing anywhere. It needs a browser with WebGL 2, as all have
 had since 2021. Press ? in it for help.
 
+If a tree has an inner cover (bake --inner), sections and wires show it in green. Press S to cut the tree open.
+
 With two trees, you can drag one body against the other. The verdict, the distance, the nearest points and the
 counts come from prolate's own runtime, compiled to WebAssembly; this needs a command that was built where
 emscripten was installed.

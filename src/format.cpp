@@ -85,10 +85,11 @@ struct FileLayout {
 void store_header(std::byte* h, const BakeInfo& info, uint32_t degree, const Lattice& lattice,
                   const FileLayout& layout) {
     std::memcpy(h + kAtMagic, kMagic, sizeof kMagic);
-    store_le(h + kAtVersion, kFormatVersion);
+    store_le(h + kAtVersion, info.inner ? kFormatVersion : kPlainFormatVersion);
     store_le(h + kAtHeaderSize, static_cast<uint16_t>(kHeaderBytes));
     store_le(h + kAtFlags, (info.surface_mode ? kSurfaceMode : 0u) | (info.exact ? kExact : 0u) |
-                               (info.proved ? kProved : 0u) | (info.goal_reached ? 0u : kGoalMissed));
+                               (info.proved ? kProved : 0u) | (info.goal_reached ? 0u : kGoalMissed) |
+                               (info.inner ? kInner : 0u));
     store_le(h + kAtSourceHash, info.source_hash);
     store_le(h + kAtOptionsHash, info.options_hash);
     store_le(h + kAtNodeCount, static_cast<uint32_t>(layout.node_count));
@@ -248,6 +249,20 @@ void store_hulls(std::span<std::byte> file, std::span<const std::byte> hulls) {
     assert((begin - bounding_begin(levels)) / kBlockBytes * kHullBytes == hulls.size());
     std::copy(hulls.begin(), hulls.end(), section.begin());
     store_le(section.data() + hulls.size(), section_hash(section, hulls.size()));
+}
+
+void append_section(std::vector<std::byte>& file, const char (&kind)[4], std::span<const std::byte> content) {
+    const auto begin = static_cast<size_t>(section_aligned(file.size()));
+    file.resize(static_cast<size_t>(section_aligned(begin + kSectionContent + content.size())));
+    std::byte *const h = file.data(), *const section = h + begin;
+    std::memcpy(section + kSectionKind, kind, sizeof kind);
+    store_le(section + kSectionSize, uint64_t{content.size()});
+    store_le(section + kSectionHash, kind_hash(section, content));
+    std::copy(content.begin(), content.end(), section + kSectionContent);
+    store_le(h + kAtVersion, kFormatVersion);
+    store_le(h + kAtFlags, load_le<uint32_t>(h + kAtFlags) | kHasSections);
+    store_le(h + kAtTotalSize, uint64_t{file.size()});
+    store_le(h + kAtHeaderHash, header_hash({h, table_end(load_le<uint16_t>(h + kAtLevelCount))}));
 }
 
 } // namespace prolate::format

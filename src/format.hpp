@@ -98,4 +98,7 @@ std::vector<std::byte> encode(const BakeInfo& info, uint32_t degree, const Latti
 /// Puts hull records (src/hull.hpp), one for each block, into a whole file of an exact tree.
 void store_hulls(std::span<std::byte> file, std::span<const std::byte> hulls);
 
+/// Appends a section (src/FORMAT.md, "Sections") to a whole file, of either version; it is of kFormatVersion then.
+void append_section(std::vector<std::byte>& file, const char (&kind)[4], std::span<const std::byte> content);
+
 } // namespace prolate::format

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "src/block.hpp"
+#include "src/bytes.hpp"
 #include "src/hash.hpp"
 #include "src/hull.hpp"
 
@@ -57,7 +58,16 @@ enum HeaderOffset : size_t {
     kAtMass = 200, // volume, center, inertia, errors: kMassNumbers doubles
     kHeaderBytes = 304,
 };
-enum Flag : uint32_t { kSurfaceMode = 1, kExact = 2, kProved = 4, kGoalMissed = 8, kAllFlags = 15 };
+enum Flag : uint32_t {
+    kSurfaceMode = 1,
+    kExact = 2,
+    kProved = 4,
+    kGoalMissed = 8,
+    kPlainFlags = 15, // all that version 8 has
+    kHasSections = 16,
+    kInner = 32,
+    kAllFlags = 63,
+};
 
 inline constexpr size_t kMassNumbers = 13, kMassErrors = 10; // the last three are errors
 static_assert(kAtMass + sizeof(double) * kMassNumbers == kHeaderBytes);
@@ -121,6 +131,35 @@ constexpr uint64_t section_bytes(uint64_t blocks, uint32_t vertices, uint32_t tr
 // Of a whole section whose hulls take `hull_bytes`.
 inline uint64_t section_hash(std::span<const std::byte> section, size_t hull_bytes) {
     return hash_bytes(section.subspan(hull_bytes + kSectionHashBytes), hash_bytes(section.first(hull_bytes)));
+}
+
+// Sections follow everything else, each from a multiple of kBlockAlignment on: this header, then the content; zeros
+// fill the gaps.
+enum SectionOffset : size_t {
+    kSectionKind = 0, // four characters
+    kSectionSize = 8, // of the content, 64 bits
+    kSectionHash = 16,
+    kSectionZeros = 24,
+    kSectionContent = 64,
+};
+inline constexpr char kInnerKind[4] = {'I', 'N', 'N', 'R'};
+
+// The next place for a section, or its end.
+constexpr uint64_t section_aligned(uint64_t at) {
+    return (at + kBlockAlignment - 1) / kBlockAlignment * kBlockAlignment;
+}
+
+// Of the section whose header and content these are.
+inline uint64_t kind_hash(const std::byte* header, std::span<const std::byte> content) {
+    return hash_bytes(content, hash_bytes({header, kSectionHash}));
+}
+
+// The lattice that a header names.
+inline LatticeInfo lattice_of(const std::byte* header) {
+    LatticeInfo out;
+    for (size_t i = 0; i < 3; ++i) out.origin[i] = load_le<int32_t>(header + kAtOrigin + 4 * i);
+    out.step_exponent = load_le<int16_t>(header + kAtStepExponent);
+    return out;
 }
 
 // Hash of header and levels table without the hash field itself.

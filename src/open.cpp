@@ -78,11 +78,17 @@ Result<void> check_header(std::span<const std::byte> bytes) {
     if (version > kFormatVersion)
         return Error{ErrorCode::newer_version, "written by a newer format version than this library reads", version};
     if (version == 0) return bad("unknown format version", kAtVersion);
-    if (version < kFormatVersion) return bad("written by an older format version than this library reads", kAtVersion);
+    if (version < kPlainFormatVersion)
+        return bad("written by an older format version than this library reads", kAtVersion);
     if (bytes.size() < kHeaderBytes) return bad("the file ends inside its header", bytes.size());
     if (load_le<uint16_t>(h + kAtHeaderSize) != kHeaderBytes) return bad("wrong header size", kAtHeaderSize);
     const uint32_t flags = load_le<uint32_t>(h + kAtFlags);
-    if ((flags & ~uint32_t{kAllFlags}) != 0) return bad("unknown flag", kAtFlags);
+    const uint32_t known = version == kPlainFormatVersion ? kPlainFlags : kAllFlags;
+    if ((flags & ~known) != 0) return bad("unknown flag", kAtFlags);
+    if (version != kPlainFormatVersion && (flags & ~uint32_t{kPlainFlags}) == 0)
+        return bad("without sections, and no inner cover: that would be version 8", kAtFlags);
+    if ((flags & kInner) != 0 && (flags & (kSurfaceMode | kExact | kHasSections)) != 0)
+        return bad("an inner cover of no solid, with triangles or with sections", kAtFlags);
     const uint32_t levels = load_le<uint16_t>(h + kAtLevelCount);
     if (levels < 1 || levels > kMaxLevels) return bad("level count out of range", kAtLevelCount);
     const uint32_t degree = load_le<uint16_t>(h + kAtDegree);
@@ -331,6 +337,7 @@ struct Layout : Levels {
     uint32_t level_count = 0;
     bool exact = false;
     uint64_t total = 0;       // bytes of the whole file
+    uint64_t tree_end = 0;    // where its sections begin, but for the zeros before, or it ends
     uint64_t present_end = 0; // where the last of these levels ends
 };
 
@@ -350,17 +357,22 @@ Result<Layout> check_layout(std::span<const std::byte> bytes, bool check_hash) {
     if (!levels) return levels.error();
     static_cast<Levels&>(out) = *levels;
     if (load_le<uint32_t>(h + kAtNodeCount) != out.nodes) return bad("wrong node count", kAtNodeCount);
-    out.total = end_of_blocks(out.level_count, out.bounding_blocks + out.blocks);
+    out.tree_end = end_of_blocks(out.level_count, out.bounding_blocks + out.blocks);
     if (out.exact)
-        out.total +=
+        out.tree_end +=
             section_bytes(out.blocks, load_le<uint32_t>(h + kAtVertexCount), load_le<uint32_t>(h + kAtTriangleCount));
-    if (load_le<uint64_t>(h + kAtTotalSize) != out.total) return bad("wrong total size", kAtTotalSize);
+    out.total = load_le<uint64_t>(h + kAtTotalSize);
+    const bool has_sections = (load_le<uint32_t>(h + kAtFlags) & kHasSections) != 0;
+    if (has_sections ? out.total < section_aligned(out.tree_end) + kSectionContent || out.total % kBlockAlignment != 0
+                     : out.total != out.tree_end)
+        return bad("wrong total size", kAtTotalSize);
     if (out.present == 0) return bad("the file is cut off before the end of its first level", bytes.size());
     out.present_end = load_le<uint64_t>(h + kHeaderBytes + (out.present - 1) * kLevelBytes + kLevelEndByte);
     if (bytes.size() > out.total) return bad("bytes follow the end of the tree", out.total);
     if (bytes.size() != out.total && bytes.size() != out.present_end)
-        return out.present == out.level_count ? bad("the file is cut off inside its triangles", bytes.size())
-                                              : bad("the file is cut off inside a level", bytes.size());
+        return out.present < out.level_count  ? bad("the file is cut off inside a level", bytes.size())
+               : bytes.size() >= out.tree_end ? bad("the file is cut off inside its sections", bytes.size())
+                                              : bad("the file is cut off inside its triangles", bytes.size());
     const size_t bounding = bounding_begin(out.level_count);
     if (const size_t at = first_nonzero(h, table_bytes, bounding); at < bounding)
         return bad("bytes between the levels table and the nodes are not zero", at);
@@ -379,6 +391,28 @@ Result<void> check_slab(const std::byte* h, size_t at, uint32_t triangle_count) 
     if (!(std::isfinite(low) && std::isfinite(high) && low <= high))
         return bad("heights of a slab out of range", at + kHullLow);
     return {};
+}
+
+// The section at `at`: its header, its zeros and its hash. Returns where the next one begins.
+Result<size_t> check_section(std::span<const std::byte> file, size_t at, bool check_hash) {
+    const std::byte* const h = file.data() + at;
+    for (size_t i = 0; i < sizeof kInnerKind; ++i)
+        if (const auto c = load_le<uint8_t>(h + i); c <= ' ' || c > '~')
+            return bad("the kind of a section is no word", at + i);
+    if (!all_zero(h + sizeof kInnerKind, kSectionSize - sizeof kInnerKind))
+        return bad("reserved bytes are not zero", at + sizeof kInnerKind);
+    const uint64_t room = file.size() - at - kSectionContent; // a multiple of the alignment
+    const auto size = load_le<uint64_t>(h + kSectionSize);
+    if (size == 0 || size > room) return bad("wrong size of a section", at + kSectionSize);
+    if (const size_t found = first_nonzero(h, kSectionZeros, kSectionContent); found < kSectionContent)
+        return bad("reserved bytes are not zero", at + found);
+    const size_t begin = at + kSectionContent, end = begin + static_cast<size_t>(size);
+    if (check_hash && kind_hash(h, file.subspan(begin, end - begin)) != load_le<uint64_t>(h + kSectionHash))
+        return bad("a section is damaged (hash mismatch)", at + kSectionHash);
+    const auto next = static_cast<size_t>(section_aligned(end));
+    if (const size_t found = first_nonzero(file.data(), end, next); found < next)
+        return bad("bytes behind a section are not zero", found);
+    return next;
 }
 
 // One level's nodes: the only root, or the children of the level above.
@@ -403,13 +437,17 @@ Result<TreeView> TreeView::open(std::span<const std::byte> bytes, const OpenOpti
     view.raw_.blocks_ = h + static_cast<size_t>(end_of_blocks(layout->level_count, layout->bounding_blocks));
     view.level_count_ = layout->level_count; // for a look beyond the bytes, at the table
     view.is_prefix_ = bytes.size() < layout->total;
-    for (size_t i = 0; i < 3; ++i) view.raw_.lattice_.origin[i] = load_le<int32_t>(h + kAtOrigin + 4 * i);
-    view.raw_.lattice_.step_exponent = load_le<int16_t>(h + kAtStepExponent);
+    view.raw_.lattice_ = lattice_of(h);
     if (const auto sound = view.open_nodes(layout->present, layout->exact, options.check_hash); !sound)
         return sound.error();
-    if (!layout->exact || view.is_prefix_) return view;
-    if (const auto sound = view.open_triangles(static_cast<size_t>(layout->present_end), options.check_hash); !sound)
-        return sound.error();
+    if (view.is_prefix_) return view;
+    if (layout->exact)
+        if (const auto sound = view.open_triangles(static_cast<size_t>(layout->present_end), options.check_hash);
+            !sound)
+            return sound.error();
+    if (layout->total > layout->tree_end)
+        if (const auto sound = view.open_sections(static_cast<size_t>(layout->tree_end), options.check_hash); !sound)
+            return sound.error();
     return view;
 }
 
@@ -457,10 +495,11 @@ Result<void> TreeView::open_triangles(size_t hulls, bool check_hash) noexcept {
     const std::byte* const h = bytes_.data();
     const size_t hull_bytes = block_count_ * kHullBytes, hash = hulls + hull_bytes;
     const size_t vertices = hash + kSectionHashBytes;
-    if (check_hash && section_hash(bytes_.subspan(hulls), hull_bytes) != load_le<uint64_t>(h + hash))
-        return bad("the triangles are damaged (hash mismatch)", hash);
     vertex_count_ = load_le<uint32_t>(h + kAtVertexCount);
     triangle_count_ = load_le<uint32_t>(h + kAtTriangleCount);
+    const auto size = static_cast<size_t>(section_bytes(block_count_, vertex_count_, triangle_count_));
+    if (check_hash && section_hash(bytes_.subspan(hulls, size), hull_bytes) != load_le<uint64_t>(h + hash))
+        return bad("the triangles are damaged (hash mismatch)", hash);
     for (size_t at = hulls; at < hash; at += kHullBytes) {
         if (const auto sound = check_slab(h, at, triangle_count_); !sound) return sound;
         raw_.has_slabs_ = raw_.has_slabs_ || has_slab(h + at);
@@ -481,6 +520,29 @@ Result<void> TreeView::open_triangles(size_t hulls, bool check_hash) noexcept {
             if (corner >= vertex_count_)
                 return bad("a triangle names a vertex that does not exist",
                            static_cast<size_t>(raw_.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count_));
+    return {};
+}
+
+Result<void> TreeView::open_sections(size_t begin, bool check_hash) noexcept {
+    size_t at = static_cast<size_t>(section_aligned(begin));
+    if (const size_t found = first_nonzero(bytes_.data(), begin, at); found < at)
+        return bad("bytes before the sections are not zero", found);
+    sections_ = at;
+    for (size_t next; at < bytes_.size(); at = next) {
+        const auto end = check_section(bytes_, at, check_hash);
+        if (!end) return end.error();
+        next = *end;
+        const auto [kind, content] = section(section_count_++);
+        if (std::memcmp(kind, kInnerKind, sizeof kInnerKind) != 0) continue; // skipped, if it is not known
+        const size_t where = at + kSectionContent;
+        if (!inner_.empty()) return bad("two inner covers", at);
+        if (content.size() < kHeaderBytes || (load_le<uint32_t>(content.data() + kAtFlags) & kInner) == 0)
+            return bad("an inner cover that says it is none", where);
+        const auto tree = open(content, {.check_hash = check_hash}); // it has no sections: no deeper than this
+        if (!tree) return Error{tree.error().code, tree.error().what, tree.error().where + where};
+        if (tree->is_prefix()) return bad("an inner cover that is cut off", where);
+        inner_ = content;
+    }
     return {};
 }
 

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 
 namespace prolate {
 namespace {
@@ -58,6 +59,69 @@ Result<Tree> Tree::rounded(float radius) && {
     return Tree(std::move(bytes_), *view);
 }
 
+TreeView TreeView::coarser(uint32_t last) const noexcept {
+    if (last + 1 >= level_count_) return *this;
+    TreeView out = *this;
+    out.bytes_ = bytes_.first(static_cast<size_t>(level(last).end_byte));
+    out.is_prefix_ = true;
+    out.inner_ = {}, out.section_count_ = 0;
+    out.raw_.hulls_ = out.raw_.vertices_ = out.raw_.triangles_ = nullptr;
+    out.raw_.has_slabs_ = false;
+    out.vertex_count_ = out.triangle_count_ = out.component_count_ = 0;
+    out.count_levels(last + 1);
+    out.root_bound_ = out.bound(0);
+    return out;
+}
+
+// With the first `count` levels.
+void TreeView::count_levels(uint32_t count) noexcept {
+    level_count_ = count;
+    node_count_ = block_count_ = 0;
+    for (uint32_t l = 0; l < count; ++l) node_count_ += level(l).node_count, block_count_ += level(l).block_count;
+    if (raw_.bounding_blocks_ != nullptr) raw_.bounding_count_ = first_slot(count - 1) / kBlockLanes;
+}
+
+// What open() makes of the bytes of a whole tree without triangles and sections, which it has checked before.
+TreeView TreeView::of_checked(std::span<const std::byte> bytes) noexcept {
+    const std::byte* const h = bytes.data();
+    const uint32_t levels = load_le<uint16_t>(h + kAtLevelCount);
+    TreeView out;
+    out.bytes_ = bytes;
+    out.raw_.bounding_blocks_ = h + bounding_begin(levels);
+    out.raw_.lattice_ = lattice_of(h);
+    const auto bounding = load_le<uint32_t>(h + kHeaderBytes + (levels - 1) * kLevelBytes + kLevelFirstBlock);
+    out.raw_.blocks_ = h + static_cast<size_t>(end_of_blocks(levels, bounding));
+    out.count_levels(levels);
+    out.root_ = out.ellipsoid(0);
+    out.root_bound_ = out.bound(0);
+    return out;
+}
+
+std::optional<TreeView> TreeView::inner() const noexcept {
+    if (inner_.empty()) return std::nullopt;
+    TreeView out = of_checked(inner_);
+    out.raw_.lattice_.scale = raw_.lattice_.scale;
+    out.radius_ = radius_;
+    return out;
+}
+
+uint16_t TreeView::format_version() const noexcept {
+    return load_le<uint16_t>(bytes_.data() + kAtVersion);
+}
+
+Section TreeView::section(uint32_t s) const noexcept {
+    assert(s < section_count_);
+    size_t at = sections_;
+    const auto end_of = [this](size_t from) {
+        return from + kSectionContent + static_cast<size_t>(load_le<uint64_t>(bytes_.data() + from + kSectionSize));
+    };
+    for (; s > 0; --s) at = static_cast<size_t>(section_aligned(end_of(at)));
+    Section out;
+    std::memcpy(out.kind, bytes_.data() + at + kSectionKind, sizeof out.kind);
+    out.content = bytes_.subspan(at + kSectionContent, end_of(at) - (at + kSectionContent));
+    return out;
+}
+
 uint32_t TreeView::degree() const noexcept {
     return load_le<uint16_t>(bytes_.data() + kAtDegree);
 }
@@ -77,6 +141,10 @@ uint32_t TreeView::level_of(uint32_t slot) const noexcept {
 
 bool TreeView::surface_mode() const noexcept {
     return (load_le<uint32_t>(bytes_.data() + kAtFlags) & kSurfaceMode) != 0;
+}
+
+bool TreeView::is_exact() const noexcept {
+    return (load_le<uint32_t>(bytes_.data() + kAtFlags) & kExact) != 0;
 }
 
 LevelInfo TreeView::level(uint32_t l) const noexcept {
@@ -108,9 +176,10 @@ BakeInfo TreeView::bake_info() const noexcept {
     return {.source_hash = load_le<uint64_t>(h + kAtSourceHash),
             .options_hash = load_le<uint64_t>(h + kAtOptionsHash),
             .surface_mode = surface_mode(),
-            .exact = (load_le<uint32_t>(h + kAtFlags) & kExact) != 0,
+            .exact = is_exact(),
             .proved = (load_le<uint32_t>(h + kAtFlags) & kProved) != 0,
             .goal_reached = (load_le<uint32_t>(h + kAtFlags) & kGoalMissed) == 0,
+            .inner = (load_le<uint32_t>(h + kAtFlags) & kInner) != 0,
             .solid_volume = load_le<double>(h + kAtSolidVolume),
             .solid_volume_error = load_le<float>(h + kAtSolidVolumeError),
             .mass = std::bit_cast<MassProperties>(mass),

@@ -1,11 +1,16 @@
 // A body's buffers: the ellipsoids of the cut that is shown, the mesh, and the distances around the solid.
-import {kBodyColours, kContact, kMesh, kMeshInside} from './colours.js';
+import {kBodyColours, kContact, kInner, kMesh, kMeshInside} from './colours.js';
 import {bindTexture, vertexArray} from './gl.js';
 
-const kRowBits = 28; // of an id: the node's row + 1; above it the body
+const kRowBits = 28; // of an id: the node's row + 1; above it the body, ...
+const kInnerBit = 8; // ... and this bit if it is one of the inner cover
 
 export const idOf = (body, row) => (body << kRowBits | (row + 1)) >>> 0;
-export const nodeOf = (id) => (id === 0 ? null : {body: id >>> kRowBits, row: (id & ((1 << kRowBits) - 1)) - 1});
+// Of an inner cover, which the pointer passes over.
+const idOfInner = (body, row) => idOf(body | kInnerBit, row);
+export const nodeOf = (id) => (id === 0 || id >>> kRowBits & kInnerBit ?
+                                   null :
+                                   {body: id >>> kRowBits, row: (id & ((1 << kRowBits) - 1)) - 1});
 
 export class BodyLayers {
   constructor(gl, body, index) { Object.assign(this, {gl, body, index, level: -1}); }
@@ -21,12 +26,7 @@ export class BodyLayers {
         colours.set(colour.subarray(3 * row, 3 * row + 3), 3 * i);
       });
       this.coverArray?.free();
-      this.coverArray = vertexArray(this.gl, {
-        0: {data: shapes, size: 9, divisor: 1}, // takes up locations 0 to 2
-        3: {data: colours, size: 3, divisor: 1, normalised: true},
-        4: {data: Uint32Array.from(rows, (row) => idOf(this.index, row)), size: 1, divisor: 1, integer: true},
-        5: {data: new Uint8Array(rows.length), size: 1, divisor: 1},
-      });
+      this.coverArray = ellipsoidArray(this.gl, shapes, colours, rows.map((row) => idOf(this.index, row)));
       Object.assign(this, {level, count: rows.length, marked: undefined});
     }
     if (marked !== this.marked) {
@@ -34,6 +34,33 @@ export class BodyLayers {
       this.gl.bufferSubData(this.gl.ARRAY_BUFFER, 0, Uint8Array.from(rows, (row) => (marked?.has(row) ? 1 : 0)));
       this.marked = marked;
     }
+  }
+
+  /// The inner cover at the same level, green, before all else in a section.
+  drawInner(programWith, view, look) {
+    if (!this.body.inner) return;
+    if (this.innerLevel !== this.level) {
+      const rows = this.body.innerCut(this.level), {ellipsoid} = this.body.inner.nodes;
+      const shapes = new Float32Array(9 * rows.length);
+      rows.forEach((row, i) => shapes.set(ellipsoid.subarray(9 * row, 9 * row + 9), 9 * i));
+      this.innerArray?.free();
+      const colours = new Uint8Array(3 * rows.length), ids = rows.map((row) => idOfInner(this.index, row));
+      this.innerArray = ellipsoidArray(this.gl, shapes, colours, ids);
+      Object.assign(this, {innerLevel: this.level, innerCount: rows.length});
+    }
+    const program =
+        programWith({WIRE: false, SECTION: Boolean(look.section), HAS_DISTANCE: false, OUTSIDE: false});
+    program.use({
+      ...view,
+      u_of_body: true,
+      u_body_colour: kInner,
+      u_mark_colour: kContact,
+      u_distance: 0, // not looked at, but samplers of two kinds must not share a unit
+      u_ramp: 1,
+      u_ahead: 1,
+    });
+    this.gl.bindVertexArray(this.innerArray.array);
+    this.gl.drawArraysInstanced(this.gl.TRIANGLE_STRIP, 0, 4, this.innerCount);
   }
 
   /// `programWith(switches)` gives the program: what is not asked for must not cost time in each pixel.
@@ -63,6 +90,7 @@ export class BodyLayers {
       u_distance_step: lattice ? lattice.size.map((n) => 1 / (n * lattice.pitch)) : [0, 0, 0],
       u_ramp: 1,
       u_ramp_end: look.rampEnd,
+      u_ahead: 0,
     });
     gl.bindVertexArray(this.coverArray.array);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.count);
@@ -75,6 +103,16 @@ export class BodyLayers {
     this.gl.bindVertexArray(this.meshArray.array);
     this.gl.drawArrays(this.gl.TRIANGLES, 0, this.body.mesh.triangles.length);
   }
+}
+
+// One instance for each ellipsoid, nine numbers each; none is marked.
+function ellipsoidArray(gl, shapes, colours, ids) {
+  return vertexArray(gl, {
+    0: {data: shapes, size: 9, divisor: 1}, // takes up locations 0 to 2
+    3: {data: colours, size: 3, divisor: 1, normalised: true},
+    4: {data: Uint32Array.from(ids), size: 1, divisor: 1, integer: true},
+    5: {data: new Uint8Array(ids.length), size: 1, divisor: 1},
+  });
 }
 
 function cornersOf({vertices, triangles}) {

@@ -98,6 +98,7 @@ uniform sampler3D u_distance;
 uniform vec3 u_distance_origin, u_distance_step; // p -> texture coordinates
 uniform sampler2D u_ramp;
 uniform float u_ramp_end;
+uniform float u_ahead; // 1: in a section it comes before what is 0
 ${kShading}
 
 float distance_at(vec3 p) { return texture(u_distance, (p - u_distance_origin) * u_distance_step).r; }
@@ -157,7 +158,7 @@ void main() {
   } else {
     colour = shade(WIRE ? 0.55 * colour : colour, n, u_key, u_sky);
   }
-  gl_FragDepth = u_depth.x - u_depth.y / t + (SECTION ? SECTION_DEPTH * dot(y, y) : 0.0);
+  gl_FragDepth = u_depth.x - u_depth.y / t + (SECTION ? SECTION_DEPTH * (dot(y, y) - u_ahead) : 0.0);
   o_colour = stored(colour);
   o_id = v_id;
 }`;

@@ -38,6 +38,9 @@ export function shortcuts(app) {
     ['M', 'mesh shown or not', letter('m'), () => state.set({meshOpacity: state.meshOpacity > 0 ? 0 : 1})],
     ['W', 'ellipsoids as wires', letter('w'), toggle('coverWire')],
     ['E', 'mesh as wires', letter('e'), toggle('meshWire')],
+    ...(app.scene.bodies.some((body) => body.inner) ?
+            [['I', 'inner cover in sections and wires', letter('i'), toggle('inner')]] :
+            []),
   ];
   const section = [
     ['S', 'section on or off', letter('s'), toggle('section')],

@@ -80,6 +80,11 @@ export class Renderer {
         layers.drawCover(
             (switches) => this.program('cover', switches), this.viewOf(layers.body, lens, look.section),
             {...look, wire: look.coverWire, line});
+    // Elsewhere the cover hides what is inside.
+    if (look.coverOpacity > 0 && look.inner && (look.section || look.coverWire))
+      for (const layers of this.layers)
+        layers.drawInner(
+            (switches) => this.program('cover', switches), this.viewOf(layers.body, lens, look.section), look);
     this.mesh.bind();
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
     gl.clearBufferfv(gl.DEPTH, 0, [1]);

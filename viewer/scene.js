@@ -20,6 +20,16 @@ function fromHalf(bits) {
   return sign * (exponent === 0 ? fraction * 2 ** -24 : (1 + fraction / 1024) * 2 ** (exponent - 15));
 }
 
+// Rows of the nodes of the level `last` and of the leaves above it.
+function cutOf(nodes, last) {
+  const rows = [];
+  for (let row = 0; row < nodes.slot.length; ++row) {
+    const own = nodes.level[row];
+    if (own === last || (own < last && nodes.children[row] === 0)) rows.push(row);
+  }
+  return rows;
+}
+
 /// A body: its description, with typed arrays in place of references; boxes; and where it is.
 class Body {
   constructor(description, buffer) {
@@ -39,15 +49,9 @@ class Body {
 
   get nodeCount() { return this.nodes.slot.length; }
 
-  /// Rows of the nodes of the cut at `level`: those of the level and the leaves above it.
-  cut(level) {
-    const last = Math.min(level, this.levels.length - 1), rows = [];
-    for (let row = 0; row < this.nodeCount; ++row) {
-      const own = this.nodes.level[row];
-      if (own === last || (own < last && this.nodes.children[row] === 0)) rows.push(row);
-    }
-    return rows;
-  }
+  /// Rows of the nodes of the cut at `level`, and of that of the inner cover.
+  cut(level) { return cutOf(this.nodes, Math.min(level, this.levels.length - 1)); }
+  innerCut(level) { return cutOf(this.inner.nodes, Math.min(level, this.inner.levels - 1)); }
 
   center(row) { return Array.from(this.nodes.ellipsoid.subarray(9 * row, 9 * row + 3)); }
 

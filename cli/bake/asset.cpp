@@ -105,6 +105,9 @@ void declare_asset_options(CLI::App& app, Asset& a) {
     app.add_option("--keep-holes", a.keep_holes,
                    "a ball of this radius passes the leaves wherever a somewhat larger one passes the mesh: 8mm");
     app.add_option("--fill", a.fill, "what a ball of this radius cannot reach from outside counts as solid: 20mm");
+    app.add_option(
+        "--inner", a.options.inner,
+        "also an inner cover: at most so many ellipsoids, 1 ... 65536, inside the solid; the mesh must be closed");
     app.add_option("--method", a.method, "how outside volumes are found: voxel or analytic")->capture_default_str();
     app.add_option("--primitive", a.primitive, "what the nodes are: ellipsoid or sphere")->capture_default_str();
     app.add_option("--alpha", a.options.alpha, "weight of the surface error")->capture_default_str();

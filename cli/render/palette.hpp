@@ -30,6 +30,9 @@ Oklch branch_colour(uint32_t i, uint32_t n);
 /// The neutral grey of the root and of meshes.
 inline constexpr Oklch kNeutral = {0.80, 0.004, 1.2};
 
+/// Of an inner cover, where a section shows it in the mesh.
+inline constexpr Oklch kInner = {0.52, 0.09, 4.1};
+
 /// Linear sRGB colour of every node of `tree`, by slot. Below level 1 only the lightness differs from the
 /// ancestor's, so that neighbouring siblings can be told apart.
 std::vector<Oklch> node_colours(const TreeView& tree);

@@ -61,11 +61,12 @@ struct HalfSpace {
 
 inline constexpr uint32_t kNothing = UINT32_MAX;
 inline constexpr uint32_t kMeshId = UINT32_MAX - 1;
+inline constexpr uint32_t kInnerId = UINT32_MAX - 2;
 
 /// Where a ray first meets the scene.
 struct Hit {
     double distance = std::numeric_limits<double>::infinity(); ///< in lengths of the ray's direction
-    uint32_t id = kNothing;                                    ///< the ellipsoid's node, or kMeshId
+    uint32_t id = kNothing;                                    ///< the ellipsoid's node, or kMeshId, or kInnerId
     bool in_section = false;                                   ///< within a body, where a section plane cuts it
     glm::dvec3 normal{0.0};                                    ///< unit, towards where the ray came from
     /// Equal for hits between which no outline is drawn.

@@ -5,6 +5,7 @@
 #include "cli/render/palette.hpp"
 #include "cli/render/panel.hpp"
 #include "cli/render/scene_cut.hpp"
+#include "cli/render/scene_inner.hpp"
 #include "cli/render/scene_mesh.hpp"
 #include "cli/render/solid.hpp"
 
@@ -48,6 +49,7 @@ struct Stage {
     std::unique_ptr<Solid> solid;         // if needed
     std::unique_ptr<MeshScene> mesh;      // if shown
     std::list<CutScene> cuts;             // of the levels to show
+    std::list<InnerScene> inner;          // the mesh with the inner cover at each of them, in sections
     std::list<MeshScene> surfaces;        // of covers that are no tree
     std::vector<dvec3> colours;           // by slots
     std::optional<HeatScale> heat;
@@ -224,22 +226,32 @@ HalfSpace half_space(const SectionPlane& plane, const Stage& stage, const dvec3&
 }
 
 Paint plain_paint(const Stage& stage) {
-    return [&stage, neutral = to_linear_rgb(kNeutral)](const Hit& hit, const dvec3&) {
-        return hit.id == kMeshId ? neutral : stage.colours[hit.id];
+    return [&stage, neutral = to_linear_rgb(kNeutral), inner = to_linear_rgb(kInner)](const Hit& hit, const dvec3&) {
+        return hit.id == kMeshId ? neutral : hit.id == kInnerId ? inner : stage.colours[hit.id];
     };
 }
 
 // Of a `surface`, there is no mesh that is to be neutral.
 Paint heat_paint(const Stage& stage, bool surface = false) {
-    return [&stage, surface, neutral = to_linear_rgb(kNeutral),
+    return [&stage, surface, neutral = to_linear_rgb(kNeutral), inner = to_linear_rgb(kInner),
             percent = 100 / stage.solid->diagonal()](const Hit& hit, const dvec3& at) {
         if (hit.id == kMeshId && !surface) return neutral;
+        if (hit.id == kInnerId) return inner;
         return stage.heat->colour(stage.solid->outside_distance(at / stage.frame.scale + stage.frame.center) * percent);
     };
 }
 
 void add_growth(Stage& stage, const TreeView& tree) {
     node_growth(tree, stage.growth.emplace_back(tree.slot_count()));
+}
+
+// What a section shows in the cut at a level: the mesh, if there is one, and in it the inner cover at that level.
+const Scene* mesh_of(Stage& stage, const TreeView& tree, uint32_t level, bool section) {
+    const auto inner = tree.inner();
+    if (!section || !inner) return stage.mesh.get();
+    add_growth(stage, *inner);
+    stage.cuts.emplace_back(*inner, std::min(level, inner->level_count() - 1), stage.growth.back(), stage.frame);
+    return &stage.inner.emplace_back(stage.cuts.back(), stage.mesh.get());
 }
 
 PanelContent& add_panel(Stage& stage, const Scene& scene, std::string caption, const Paint& paint) {
@@ -265,6 +277,7 @@ std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, c
     }
     stage->frame = shown.frame();
     add_growth(*stage, tree);
+    const std::vector<float>& growth = stage->growth.back();
     if (mesh_shown) stage->mesh = std::make_unique<MeshScene>(mesh->mesh.view(), stage->frame, stage->solid.get());
     for (const Oklch& colour : node_colours(tree)) stage->colours.push_back(to_linear_rgb(colour));
 
@@ -273,8 +286,8 @@ std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, c
         add_panel(*stage, *stage->mesh, caption_of(mesh->mesh.view()), paint);
     double most = 0;
     for (const uint32_t level : o.levels) {
-        stage->cuts.emplace_back(tree, level, stage->growth.back(), stage->frame);
-        std::string caption = caption_of(tree, level, stage->cuts.back().size());
+        const CutScene& cut = stage->cuts.emplace_back(tree, level, growth, stage->frame);
+        std::string caption = caption_of(tree, level, cut.size());
         if (o.heat) {
             const Figures figures = figures_of(tree, level, *mesh, *stage->solid);
             most = std::max(most, mesh->report.closed ? figures.max : figures.p99);
@@ -282,10 +295,10 @@ std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, c
         } else {
             caption += ratio_of(tree, level);
         }
-        PanelContent& content = add_panel(*stage, stage->cuts.back(), std::move(caption), paint);
+        PanelContent& content = add_panel(*stage, cut, std::move(caption), paint);
         if (o.heat) content.relief = kHeatRelief;
         content.see_through = o.mesh_style == MeshStyle::overlay;
-        if (content.see_through || o.section) content.mesh = stage->mesh.get();
+        if (content.see_through || o.section) content.mesh = mesh_of(*stage, tree, level, o.section.has_value());
     }
     if (o.heat) {
         const double top = o.heat_top > 0 ? o.heat_top : HeatScale::round_up(most);

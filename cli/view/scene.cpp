@@ -108,6 +108,8 @@ std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBloc
         out["levels"].push_back(std::move(level));
     }
     out["nodes"] = nodes_of(tree, numbers);
+    if (const auto inner = tree.inner())
+        out["inner"] = {{"levels", inner->level_count()}, {"nodes", nodes_of(*inner, numbers)}};
     if (body.mesh) {
         out["mesh"] = mesh_of(body.mesh->mesh, numbers);
         out["mesh"]["closed"] = body.mesh->report.closed;

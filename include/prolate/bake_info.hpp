@@ -27,6 +27,7 @@ struct BakeInfo {
     bool exact = false;        ///< an exact tree: the triangles are stored, and the nodes cover only them
     bool proved = false;       ///< every level was proved to cover, after quantisation, before the file was written
     bool goal_reached = true;  ///< false: the asked count or closeness could not be met
+    bool inner = false;        ///< an inner cover: each ellipsoid lies inside the solid (TreeView::inner())
     /// Cubic metres, by the columns that all ratios are measured with; mass.volume is more exact. 0 where there is no
     /// inside, and of exact trees of open meshes.
     double solid_volume = 0;

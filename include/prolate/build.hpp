@@ -46,9 +46,14 @@ struct BuildOptions {
     /// at most an eighth more. All figures are then about the filled solid. 0: only what the mesh encloses is inside.
     /// See ball_range().
     float fill = 0;
-    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, weld and threads then matter.
+    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, weld, inner and threads then
+    /// matter.
     bool exact = false;
     uint32_t leaf_triangles = 4; ///< most triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
+
+    /// Also make an inner cover (TreeView::inner()) of at most so many leaves, 1 ... 65536; 0: none. The mesh must be
+    /// closed, or be so with `fill`. Each ellipsoid is proved to lie inside the solid. The tree itself stays the same.
+    uint32_t inner = 0;
 
     Primitive primitive = Primitive::ellipsoid; ///< what the nodes are
     Quality quality = Quality::normal;          ///< resolution of the voxels, and effort of the optimisation

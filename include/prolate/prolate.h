@@ -121,6 +121,7 @@ typedef struct prolate_tree_info {
     bool exact, surface_mode, proved, prefix;
     double volume, center[3], inertia[6]; /**< mass.hpp, at density 1: xx, yy, zz, xy, xz, yz */
     double volume_error, center_error, inertia_error;
+    uint32_t inner_nodes; /**< of the inner cover; 0: there is none */
 } prolate_tree_info;
 /** query.hpp: scratch_size(): bytes that the queries of `a` need at least, or those of `a` and `b` if that is not NULL.
  * Of trees that are not open, prolate_scratch_size(). */
@@ -135,6 +136,12 @@ PROLATE_API prolate_status prolate_tree_scale(const prolate_tree* tree, float sc
 /** tree.hpp: TreeView::rounded(). `rounded` may be `tree`. */
 PROLATE_API prolate_status prolate_tree_round(const prolate_tree* tree, float radius, prolate_tree* rounded,
                                               prolate_error* error);
+
+/** tree.hpp: TreeView::coarser(). The levels 0 to `last`. `coarser` may be `tree`. */
+PROLATE_API prolate_status prolate_tree_coarser(const prolate_tree* tree, uint32_t last, prolate_tree* coarser);
+
+/** tree.hpp: TreeView::inner(). PROLATE_UNSUPPORTED if the tree has no inner cover. `inner` may be `tree`. */
+PROLATE_API prolate_status prolate_tree_inner(const prolate_tree* tree, prolate_tree* inner);
 
 /** primitives.hpp. Their bytes go into `buffer` as with prolate_tree_load(); prolate_primitive_size() is enough but for
  * large polyhedra. `triangles`: three indices each. */
@@ -225,6 +232,27 @@ typedef struct prolate_distance_result {
 /** distance.hpp: distance(). */
 PROLATE_API prolate_status prolate_distance(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
                                             const prolate_distance_options* options, prolate_distance_result* result);
+
+typedef struct prolate_solids_result {
+    uint32_t size, version;
+    prolate_verdict verdict; /**< of the solids, both ways certain; PROLATE_UNDECIDED: within the band */
+    bool out_of_budget;
+    prolate_stats stats;
+} prolate_solids_result;
+/** solids.hpp: collide_solids(). */
+PROLATE_API prolate_status prolate_collide_solids(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                                  const prolate_query_options* options, prolate_solids_result* result);
+
+typedef struct prolate_solids_distance {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    double lower, upper; /**< certified, of the solids; `upper` is infinite without inner covers */
+    prolate_stats stats;
+} prolate_solids_distance;
+/** solids.hpp: distance_solids(). */
+PROLATE_API prolate_status prolate_distance_solids(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
+                                                   const prolate_distance_options* options,
+                                                   prolate_solids_distance* result);
 
 /** contacts.hpp: ContactPoint, Manifold, ContactManifolds. Set the last to 0 before its first use; keep it from one
  * query to the next. */

@@ -1,7 +1,7 @@
 // What all queries share: verdicts, limits, counters, scratch. Queries ask about rigid bodies whose shapes are
-// ellipsoid trees: collide.hpp, distance.hpp, contacts.hpp, sweep.hpp, raycast.hpp, shapes.hpp, bounds.hpp. pairs.hpp
-// asks about two single ellipsoids, poses.hpp about many poses of two bodies, world.hpp and world_queries.hpp about
-// many bodies.
+// ellipsoid trees: collide.hpp, distance.hpp, contacts.hpp, sweep.hpp, raycast.hpp, shapes.hpp, bounds.hpp. solids.hpp
+// asks about the solids that covers stand for, pairs.hpp about two single ellipsoids, poses.hpp about many poses of two
+// bodies, world.hpp and world_queries.hpp about many bodies.
 //
 // Every query is noexcept, allocates nothing, keeps no state except what the caller hands in, and returns the same bits
 // for the same input, on every processor and from every compiler that follows IEEE 754 (README, "Determinism"). Trees

@@ -27,6 +27,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -64,6 +65,12 @@ struct TriangleRange {
     uint32_t count = 0;
 };
 
+/// What follows the tree in its file (src/FORMAT.md, "Sections").
+struct Section {
+    char kind[4];                       ///< printable; "INNR": an inner cover
+    std::span<const std::byte> content; ///< of the file's bytes
+};
+
 /// How open() checks.
 struct OpenOptions {
     /// Compare the content hashes, which finds every accidental change of a byte. Without, open() takes less time, and
@@ -93,6 +100,23 @@ public:
     Result<TreeView> rounded(float radius) const noexcept;
     /// What it was rounded by; 0 unless it comes from rounded().
     float radius() const noexcept { return radius_; }
+
+    /// The tree that ends with level `last`: what the prefix of the file is that ends there. The same tree if `last` is
+    /// its last level or beyond. Of a tree without triangles every level is a cover by itself, so queries of a coarser
+    /// tree are as certified, and cost less. It has no triangles and no sections. A view of the same bytes.
+    TreeView coarser(uint32_t last) const noexcept;
+
+    /// The *inner cover*, if the file holds one: a tree whose ellipsoids, those of all nodes, lie inside the solid. It
+    /// is scaled and rounded like this tree. bake_info().inner is true of it. solids.hpp asks about both covers. Takes
+    /// about as long as one ellipsoid takes to decode.
+    std::optional<TreeView> inner() const noexcept;
+
+    /// Version of the format that the bytes are in.
+    uint16_t format_version() const noexcept;
+    /// Sections of the file, those included whose kind this library does not know. Queries that do not need a section
+    /// answer without it. A prefix has none.
+    uint32_t section_count() const noexcept { return section_count_; }
+    Section section(uint32_t s) const noexcept; ///< `s` < section_count()
 
     uint32_t node_count() const noexcept { return node_count_; }
     uint32_t block_count() const noexcept { return block_count_; }
@@ -160,8 +184,9 @@ public:
 
     /// How the tree was baked.
     BakeInfo bake_info() const noexcept;
-    /// BakeInfo::surface_mode.
+    /// BakeInfo::surface_mode and BakeInfo::exact.
     bool surface_mode() const noexcept;
+    bool is_exact() const noexcept;
 
     /// What was opened: the bytes of the file, or of its prefix.
     std::span<const std::byte> bytes() const noexcept { return bytes_; }
@@ -172,17 +197,23 @@ private:
     TreeView() = default;
     Result<void> open_nodes(uint32_t present, bool exact, bool check_hash) noexcept;
     Result<void> open_triangles(size_t hulls, bool check_hash) noexcept;
+    Result<void> open_sections(size_t begin, bool check_hash) noexcept;
+    static TreeView of_checked(std::span<const std::byte> bytes) noexcept;
+    void count_levels(uint32_t count) noexcept;
     template <class Visit> void for_each_node_in(uint32_t begin, uint32_t end, Visit&& visit) const {
         for (uint32_t slot = begin; slot < end; ++slot)
             if (is_node(slot)) visit(slot);
     }
     std::span<const std::byte> bytes_;
+    std::span<const std::byte> inner_; // the file of the inner cover; empty without
+    size_t sections_ = 0;              // where they begin
     detail::TreeBytes raw_;
     Ellipsoid root_, root_bound_;
     uint32_t node_count_ = 0;
     uint32_t block_count_ = 0;
     uint32_t level_count_ = 0;
     bool is_prefix_ = false;
+    uint32_t section_count_ = 0;
     uint32_t vertex_count_ = 0;
     uint32_t triangle_count_ = 0;
     uint32_t component_count_ = 0;

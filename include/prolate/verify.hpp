@@ -21,7 +21,7 @@ struct LevelProof {
 
 /// Result of verify().
 struct VerifyReport {
-    bool covered = false;  ///< every level is covered, `bounded` and `holes_kept` hold
+    bool covered = false;  ///< every level is covered, `bounded`, `holes_kept` and `inner_inside` hold
     bool exact = false;    ///< the tree holds triangles
     bool same_mesh = true; ///< of an exact tree: its triangles are the mesh's. If not, no level counts as covered.
     /// Of a tree without triangles: each bounding volume holds all that lies below its node. If not, queries may
@@ -33,6 +33,10 @@ struct VerifyReport {
     /// `blocked` is not certainly free.
     bool holes_kept = true;
     double blocked[3] = {};
+    /// Of a tree with an inner cover: all ellipsoids of that lie inside the solid. If not, `protruding_node` is its
+    /// first node that does not certainly do so.
+    bool has_inner = false, inner_inside = true;
+    uint32_t protruding_node = 0;
     bool surface_mode = false;      ///< the mesh is open: the proof is about its triangles, there is no inside
     std::vector<LevelProof> levels; ///< the root first
 };
@@ -55,6 +59,8 @@ struct VerifyOptions {
 /// The mesh is given as it was read. It is welded as when the tree was baked, and points that this moves are proved
 /// where they were. A point of the solid in no node ends the proof as a counterexample; a cell that cannot be decided
 /// at 1e-9 of the mesh's size ends it as "not proved".
+///
+/// An inner cover is proved node by node: no triangle meets the ellipsoid, and its center is inside.
 ///
 /// Of an exact tree, the triangles are compared with the mesh's, and each must lie in all ellipsoids above it. A prefix
 /// of one is proved to cover the triangles, as in surface mode. Queries descend by its nodes, so there each part must

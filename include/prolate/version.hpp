@@ -9,8 +9,10 @@
 
 namespace prolate {
 
-/// The .etree format version that this library reads and writes (src/FORMAT.md).
-inline constexpr uint16_t kFormatVersion = 8;
+/// The newest .etree format version that this library reads and writes (src/FORMAT.md).
+inline constexpr uint16_t kFormatVersion = 9;
+/// That of files without sections, which are the same in both: older readers take them, too.
+inline constexpr uint16_t kPlainFormatVersion = 8;
 
 /// major * 10000 + minor * 100 + patch, as the headers say it.
 inline constexpr uint32_t kHeaderVersion =

@@ -2,11 +2,12 @@
 
 :func:`bake` makes a tree of a mesh, each level of which is proved to cover it. :func:`collide`, :func:`distance`,
 :func:`contacts`, :func:`sweep`, :func:`raycast` and :func:`overlap` ask about trees at many poses at once,
-:class:`World` about many bodies, and :mod:`prolate.pairs` about single ellipsoids. docs/python.md is the tour.
+:func:`collide_solids` and :func:`distance_solids` about the solids that covers stand for, :class:`World` about many
+bodies, and :mod:`prolate.pairs` about single ellipsoids. docs/python.md is the tour.
 """
 
 from . import pairs
-from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, Sweeps, Verdict
+from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, SolidDistances, Sweeps, Verdict
 from ._bake import BallRange, bake, bake_mesh, ball_range, least_clearance
 from ._bake_many import Asset, BakeResult, bake_many
 from ._errors import Error
@@ -16,9 +17,11 @@ from ._primitives import box_tree, convex_tree, cylinder_tree, ellipsoid_tree, s
 from ._queries import (
     bounds,
     collide,
+    collide_solids,
     contacts,
     contains,
     distance,
+    distance_solids,
     overlap,
     raycast,
     signed_distance,
@@ -62,6 +65,7 @@ __all__ = [
     "Mesh",
     "Proof",
     "SignedDistances",
+    "SolidDistances",
     "Sphere",
     "Sweeps",
     "Tree",
@@ -83,11 +87,13 @@ __all__ = [
     "bounds",
     "box_tree",
     "collide",
+    "collide_solids",
     "contacts",
     "contains",
     "convex_tree",
     "cylinder_tree",
     "distance",
+    "distance_solids",
     "ellipsoid_tree",
     "least_clearance",
     "load",

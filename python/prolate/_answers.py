@@ -49,6 +49,23 @@ class Distances(NamedTuple):
     verdict: Verdicts
 
 
+class SolidDistances(NamedTuple):
+    """Distances of N pairs of solids, metres; scalars for single poses.
+
+    Attributes
+    ----------
+    lower, upper : float64 (N,)
+        Certified: ``lower <= distance of the solids <= upper``; both are 0 where they certainly meet. ``upper`` is
+        infinite without inner covers. Their difference is the width of the band that covers leave open.
+    verdict : uint8 (N,)
+        :class:`Verdict`, that of :func:`collide_solids`.
+    """
+
+    lower: Floats
+    upper: Floats
+    verdict: Verdicts
+
+
 class Contacts(NamedTuple):
     """Contact points of N pairs of bodies, ragged: those of pair ``i`` are rows ``offsets[i]:offsets[i + 1]``.
 

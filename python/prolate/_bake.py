@@ -25,6 +25,7 @@ def bake(
     keep_holes: Union[str, float, None] = None,
     fill: Union[str, float, None] = None,
     exact: bool = False,
+    inner: int | None = None,
     primitive: Literal["ellipsoid", "sphere"] = "ellipsoid",
     quality: Literal["fast", "normal", "best"] = "normal",
     method: Literal["voxel", "analytic"] = "voxel",
@@ -73,6 +74,9 @@ def bake(
         counts as solid, so an open mesh has an inside, too. All figures are then about the filled solid.
     exact : bool
         Store the triangles in the leaves; queries then answer for them.
+    inner : int, optional
+        Also make an inner cover, :attr:`Tree.inner`, of at most so many ellipsoids, 1 ... 65536, that lie inside the
+        solid, proved. The mesh must be closed, or filled. See :func:`collide_solids`.
     primitive : {"ellipsoid", "sphere"}
     quality : {"fast", "normal", "best"}
     method : {"voxel", "analytic"}
@@ -120,7 +124,7 @@ def bake(
     return bake_mesh(
         (vertices, faces),
         levels=levels, ellipsoids=ellipsoids, tolerance=tolerance, distance=distance, clearance=clearance,
-        keep_holes=keep_holes, fill=fill, exact=exact,
+        keep_holes=keep_holes, fill=fill, exact=exact, inner=inner,
         primitive=primitive, quality=quality, method=method, degree=degree, leaf_triangles=leaf_triangles,
         alpha=alpha, beta=beta, weld=weld, seed=seed, unit=unit, scale=scale, recentre=recentre,
         threads=threads, progress=progress,
@@ -128,7 +132,7 @@ def bake(
 
 
 _OPTIONS = (
-    "levels", "ellipsoids", "tolerance", "distance", "clearance", "keep_holes", "fill", "exact",
+    "levels", "ellipsoids", "tolerance", "distance", "clearance", "keep_holes", "fill", "exact", "inner",
     "primitive", "quality", "method", "degree", "leaf_triangles", "alpha", "beta", "weld", "seed", "threads",
 )  # fmt: skip
 

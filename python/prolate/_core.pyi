@@ -30,6 +30,7 @@ class Tree:
     @property
     def has_triangles(self) -> bool: ...
     def level_end(self, level: int) -> int: ...
+    def inner_range(self) -> Optional[tuple[int, int]]: ...
     def info_dict(self) -> dict[str, Any]: ...
     def cut_arrays(self, level: object) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Index, _Index]: ...
     def mesh_arrays(self) -> tuple[NDArray[np.float32], NDArray[np.uint32]]: ...
@@ -163,6 +164,29 @@ def distance(
     threads: object,
     order: object,
 ) -> tuple[_PairArrays, bool]: ...
+def collide_solids(
+    a: object,
+    poses_a: object,
+    b: object,
+    poses_b: object,
+    margin: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    order: object,
+) -> int | _Bytes: ...
+def distance_solids(
+    a: object,
+    poses_a: object,
+    b: object,
+    poses_b: object,
+    tolerance: object,
+    max_distance: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    order: object,
+) -> tuple[tuple[_Floats, _Floats, _Bytes], bool]: ...
 def sweep(
     a: object,
     start_a: object,

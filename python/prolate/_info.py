@@ -139,6 +139,8 @@ class TreeInfo(NamedTuple):
         The mesh was open: only its triangles are certain to be covered.
     goal_reached : bool
         False: the asked number or closeness could not be met; the tree comes as close as could be.
+    is_inner : bool
+        An inner cover (:attr:`Tree.inner`): each ellipsoid lies inside the solid.
     asked : Asked
     volume, volume_error : float
         Of the solid, by the columns that all ratios are measured with, cubic metres; 0 where there is no inside.
@@ -163,6 +165,7 @@ class TreeInfo(NamedTuple):
     proved: bool
     surface_mode: bool
     goal_reached: bool
+    is_inner: bool
     asked: Asked
     volume: float
     volume_error: float
@@ -203,7 +206,7 @@ class Proof(NamedTuple):
     Attributes
     ----------
     covered : bool
-        Every level covers, the bounding volumes hold what is below them, and holes are kept.
+        Every level covers, the bounding volumes hold what is below them, holes are kept, and the inner cover is inside.
     same_mesh : bool
         Of an exact tree: its triangles are the mesh's.
     bounded : bool
@@ -211,6 +214,9 @@ class Proof(NamedTuple):
     holes_kept : bool
         Of a tree that was baked with ``keep_holes``: the ball passes wherever a somewhat larger one passes the mesh.
         If not, ``blocked`` (3,) is the center of a ball that is not certainly free.
+    inner_inside : bool
+        The ellipsoids of the inner cover, if there is one, lie inside the solid. If not, ``protruding_node`` is the
+        first of its nodes that does not certainly do so.
     surface_mode : bool
         The mesh is open, so the proof is about its triangles.
     levels : tuple of LevelProof
@@ -222,6 +228,8 @@ class Proof(NamedTuple):
     unbounded_node: int | None
     holes_kept: bool
     blocked: tuple[float, float, float] | None
+    inner_inside: bool
+    protruding_node: int | None
     surface_mode: bool
     levels: tuple[LevelProof, ...]
 

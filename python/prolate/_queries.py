@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
-from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, Sweeps, Verdict
+from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, SolidDistances, Sweeps, Verdict
 from ._shapes import HalfSpace, Shape, ground, numbers
 
 if TYPE_CHECKING:
@@ -120,6 +120,84 @@ def distance(
         return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
     arrays, single = _core.distance(a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, order)
     return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
+
+
+def collide_solids(
+    a: Tree,
+    poses_a: ArrayLike,
+    b: Tree,
+    poses_b: ArrayLike,
+    *,
+    margin: float = 0,
+    max_level: int | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> Any:
+    """Do two *solids* meet, for certain, at each of N poses? Without a triangle, from covers outside and inside.
+
+    Outer ellipsoids apart: the solids are apart. Inner ellipsoids meeting (``bake(..., inner=64)``): the solids meet.
+    Neither: ``UNDECIDED``, and whoever needs to know asks exact trees. An exact tree is the solid: its triangles decide
+    what inner covers leave open.
+
+    Parameters
+    ----------
+    a, poses_a, b, poses_b, margin, budget, threads, order
+        As for :func:`collide`. How far the runtime's single precision moves poses in float64 is allowed for both ways:
+        of trees without triangles, ``OVERLAPPING`` holds of the poses as given, too.
+    max_level : int, optional
+        The covers at this level of either tree (0 = roots only).
+
+    Returns
+    -------
+    uint8 array of shape (N,), or a Verdict if both poses are single
+        ``SEPARATED`` and ``OVERLAPPING`` are certain of the solids.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`collide`.
+    """
+    found = _core.collide_solids(a, poses_a, b, poses_b, margin, max_level, budget, threads, order)
+    return _VERDICTS[found] if isinstance(found, int) else found
+
+
+def distance_solids(
+    a: Tree,
+    poses_a: ArrayLike,
+    b: Tree,
+    poses_b: ArrayLike,
+    *,
+    tolerance: float = 1e-6,
+    max_distance: float | None = None,
+    max_level: int | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> SolidDistances:
+    """How far apart are two *solids*, at each of N poses? Bounds from covers outside and inside.
+
+    Parameters
+    ----------
+    a, poses_a, b, poses_b, max_level, budget, threads, order
+        As for :func:`collide_solids`.
+    tolerance, max_distance
+        As for :func:`distance`, of either cover. Of solids that are certainly ``max_distance`` apart, no upper bound
+        is looked for.
+
+    Returns
+    -------
+    SolidDistances
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`collide`.
+    """
+    arrays, single = _core.distance_solids(
+        a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, order
+    )
+    return SolidDistances(*(x[0] for x in arrays)) if single else SolidDistances(*arrays)
 
 
 def contacts(

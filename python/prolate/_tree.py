@@ -132,6 +132,15 @@ class Tree(_core.Tree):
         return Tree(self.buffer[: self.level_end(level)])
 
     @property
+    def inner(self) -> Tree | None:
+        """The inner cover: a tree of ellipsoids inside the solid, proved. None if it was not asked for (``inner=``).
+
+        It reads the same bytes. ``info.is_inner`` is true of it, and of each level the ``union_volume`` is known.
+        """
+        found = self.inner_range()
+        return None if found is None else Tree(self.buffer[found[0] : found[1]], check_hash=False)
+
+    @property
     def mesh(self) -> Mesh | None:
         """The triangles of an exact tree; None of others."""
         if not self.has_triangles:

@@ -202,6 +202,7 @@ BuildOptions options_of(const nb::dict& o) {
     out.keep_holes = above_0("keep_holes");
     out.fill = above_0("fill");
     out.exact = nb::cast<bool>(o["exact"]);
+    out.inner = static_cast<uint32_t>(whole_or(o["inner"], "inner", 1, 65536, 0));
     out.leaf_triangles = static_cast<uint32_t>(whole(o["leaf_triangles"], "leaf_triangles", 1, kMaxLeafTriangles));
     out.primitive = choice<Primitive>(o["primitive"], "primitive",
                                       {{"ellipsoid", Primitive::ellipsoid}, {"sphere", Primitive::sphere}});
@@ -295,6 +296,8 @@ nb::dict verify_tree(nb::handle tree, nb::handle vertices, nb::handle faces, nb:
     out["holes_kept"] = report->holes_kept;
     out["blocked"] = nb::none();
     if (!report->holes_kept) out["blocked"] = point(report->blocked);
+    out["inner_inside"] = report->inner_inside;
+    out["protruding_node"] = report->inner_inside ? nb::none() : nb::cast(report->protruding_node);
     out["surface_mode"] = report->surface_mode;
     out["levels"] = nb::tuple(levels);
     return out;

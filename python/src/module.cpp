@@ -69,5 +69,6 @@ NB_MODULE(_core, m) {
     python::bind_pairs(m);
     python::bind_robot(m);
     python::bind_shapes(m);
+    python::bind_solids(m);
     python::bind_world(m);
 }

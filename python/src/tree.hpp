@@ -34,6 +34,7 @@ void bind_primitives(nb::module_& m);
 void bind_pairs(nb::module_& m);
 void bind_robot(nb::module_& m);
 void bind_shapes(nb::module_& m);
+void bind_solids(nb::module_& m);
 void bind_world(nb::module_& m);
 
 } // namespace prolate::python

@@ -18,6 +18,17 @@ double norm(std::initializer_list<double> values) {
     return std::sqrt(sum);
 }
 
+// A view of the bytes that `owner` holds.
+HeldTree held_view(const TreeView& view, nb::handle owner) {
+    const Ellipsoid& e = view.root_bound();
+    const double radius = norm({e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
+    return {view,
+            nb::borrow(owner),
+            {e.center.x, e.center.y, e.center.z},
+            radius,
+            norm({e.center.x, e.center.y, e.center.z}) + radius};
+}
+
 HeldTree open_tree(nb::handle buffer, bool check_hash) {
     const AnyArray array = import_array(buffer);
     if (!array.is_valid() || array.dtype() != nb::dtype<uint8_t>() || array.ndim() != 1 || !array.is_contiguous())
@@ -29,13 +40,7 @@ HeldTree open_tree(nb::handle buffer, bool check_hash) {
         return TreeView::open(bytes, {.check_hash = check_hash});
     }();
     if (!view) throw Failure{view.error(), "at byte " + std::to_string(view.error().where)};
-    const Ellipsoid& e = view->root_bound();
-    const double radius = norm({e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
-    return {*view,
-            nb::borrow(buffer),
-            {e.center.x, e.center.y, e.center.z},
-            radius,
-            norm({e.center.x, e.center.y, e.center.z}) + radius};
+    return held_view(*view, buffer);
 }
 
 uint32_t level_of(const TreeView& tree, nb::handle level) {
@@ -178,6 +183,7 @@ nb::dict info_of(const HeldTree& held) {
     out["proved"] = info.proved;
     out["surface_mode"] = info.surface_mode;
     out["goal_reached"] = info.goal_reached;
+    out["is_inner"] = info.inner;
     out["volume"] = info.solid_volume;
     out["volume_error"] = info.solid_volume * static_cast<double>(info.solid_volume_error);
     out["mass"] = mass_dict(info.mass);
@@ -226,6 +232,13 @@ void bind_tree(nb::module_& m) {
             "level_end",
             [](const HeldTree& self, nb::handle level) { return self.view.level(level_of(self.view, level)).end_byte; },
             nb::arg("level").none())
+        .def("inner_range",
+             [](const HeldTree& self) -> nb::object { // of its bytes, or None
+                 const auto inner = self.view.inner();
+                 if (!inner) return nb::none();
+                 const size_t begin = static_cast<size_t>(inner->bytes().data() - self.view.bytes().data());
+                 return nb::make_tuple(begin, begin + inner->bytes().size());
+             })
         .def("info_dict", &info_of)
         .def("cut_arrays", &cut, nb::arg("level").none())
         .def("mesh_arrays", &mesh_of);

@@ -11,6 +11,13 @@ constexpr uint32_t kLeastHeap = 32; // entries
 constexpr uint32_t kBesides = kMaxDegree + kLeastHeap;
 static_assert(kBesides + 2 * kMaxDegree * (kMaxLevels - 1) <= QueryContext::kEntries);
 
+// Of the tree or its inner cover, whichever needs more.
+uint32_t most_siblings(const TreeView& tree) {
+    const uint32_t own = query::siblings_on_the_way(tree);
+    const auto inner = tree.inner();
+    return inner ? std::max(own, query::siblings_on_the_way(*inner)) : own;
+}
+
 size_t bytes_for(uint32_t siblings) {
     return size_t{kBesides + siblings} * sizeof(Scratch::Entry) + alignof(Scratch::Entry);
 }
@@ -29,10 +36,10 @@ Scratch::Scratch(std::span<std::byte> memory) noexcept : entries_(nullptr), coun
 }
 
 size_t scratch_size(const TreeView& tree) noexcept {
-    return bytes_for(query::siblings_on_the_way(tree));
+    return bytes_for(most_siblings(tree));
 }
 size_t scratch_size(const TreeView& a, const TreeView& b) noexcept {
-    return bytes_for(query::siblings_on_the_way(a) + query::siblings_on_the_way(b));
+    return bytes_for(most_siblings(a) + most_siblings(b));
 }
 
 bool query::suffices(const Scratch& scratch, const TreeView& tree) noexcept {

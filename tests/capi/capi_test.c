@@ -129,6 +129,36 @@ static void test_pairs(void) {
     CHECK(s.verdict == PROLATE_OVERLAPPING && fabs(s.time_upper - 0.5) < 1e-3);
 }
 
+static void test_solids(void) {
+    prolate_tree coarser, inner;
+    CHECK_OK(prolate_tree_coarser(&box, 0, &coarser));
+    prolate_tree_info info = PROLATE_INIT(prolate_tree_info);
+    CHECK_OK(prolate_tree_describe(&coarser, &info));
+    CHECK(info.levels == 1 && info.inner_nodes == 0);
+    CHECK_STATUS(prolate_tree_inner(&box, &inner), PROLATE_UNSUPPORTED);
+    CHECK_STATUS(prolate_tree_inner(&box, NULL), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_tree_coarser(NULL, 0, &coarser), PROLATE_BAD_ARGUMENT);
+
+    prolate_solids_result result = PROLATE_INIT(prolate_solids_result); /* of triangles: both ways certain */
+    CHECK_OK(prolate_collide_solids(at(&box, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &result));
+    CHECK(result.verdict == PROLATE_SEPARATED && !result.out_of_budget);
+    CHECK_OK(prolate_collide_solids(at(&box, 0, 0, 0), at(&box, 0.5f, 0, 0), scratch, scratch_size, NULL, &result));
+    CHECK(result.verdict == PROLATE_OVERLAPPING);
+    CHECK_OK(prolate_collide_solids(at(&box, 0, 0, 0), at(&ball, 1, 0, 0), scratch, scratch_size, NULL, &result));
+    CHECK(result.verdict == PROLATE_UNDECIDED && !result.out_of_budget); /* the ball has no inner cover */
+    CHECK_STATUS(prolate_collide_solids(at(&box, 0, 0, 0), at(&ball, 1, 0, 0), NULL, scratch_size, NULL, &result),
+                 PROLATE_BAD_ARGUMENT);
+
+    prolate_solids_distance d = PROLATE_INIT(prolate_solids_distance);
+    CHECK_OK(prolate_distance_solids(at(&box, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
+    CHECK(d.verdict == PROLATE_SEPARATED && d.lower <= 2 && d.upper >= 2 && d.upper - d.lower < 1e-5);
+    CHECK_OK(prolate_distance_solids(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), scratch, scratch_size, NULL, &d));
+    CHECK(d.verdict == PROLATE_SEPARATED && d.lower <= 1.5 && d.lower > 1.49 && isinf(d.upper));
+    d.size = 4;
+    CHECK_STATUS(prolate_distance_solids(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), scratch, scratch_size, NULL, &d),
+                 PROLATE_BAD_STRUCT);
+}
+
 static void test_one_body(void) {
     prolate_raycast_result r = PROLATE_INIT(prolate_raycast_result);
     const prolate_ray ray = {{-5, 0.1f, 0.1f}, {1, 0, 0}, INFINITY};
@@ -482,6 +512,7 @@ int main(void) {
     scratch = aligned_alloc(64, scratch_size);
     test_trees();
     test_pairs();
+    test_solids();
     test_one_body();
     test_scaled_and_shapes();
     test_worlds();

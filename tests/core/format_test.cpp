@@ -480,7 +480,7 @@ TEST(Format, TheDescriptionIsOfThisVersion) {
     const Bytes file = read(fs::path(PROLATE_TEST_DATA) / "../../src/FORMAT.md");
     const std::string text(reinterpret_cast<const char*>(file.data()), file.size());
     const std::string version = std::to_string(kFormatVersion);
-    for (const std::string& words : {"format, version " + version, "| version | " + version + " |",
+    for (const std::string& words : {"format, version " + version, "| version | " + version + " if",
                                      "golden_v" + version + ".etree", "| " + version + " | 0.1.0 |"})
         EXPECT_NE(text.find(words), std::string::npos) << words;
 }
@@ -580,6 +580,159 @@ TEST(Format, WithoutHashesEveryChangeIsRefusedOrSound) {
     expect_refused_or_sound(golden_exact());
 }
 
+// The golden tree with an inner cover, and a section of a kind that nobody knows.
+Bytes golden_inner() {
+    BakeInfo info = golden_info();
+    info.surface_mode = false, info.inner = true;
+    auto levels = golden_levels();
+    levels.pop_back();
+    levels[1].nodes[0].child_count = 0;
+    return format::encode(info, 2, {{-30, 7, 900}, -3}, levels);
+}
+constexpr size_t kSection = kEnd, kContent = kSection + 64; // the golden tree ends at a multiple of 64
+size_t second_section() {
+    return (kContent + golden_inner().size() + 63) / 64 * 64;
+}
+Bytes golden_with_sections() {
+    Bytes bytes = golden();
+    format::append_section(bytes, {'I', 'N', 'N', 'R'}, golden_inner());
+    const std::byte unknown[] = {std::byte{7}, std::byte{8}, std::byte{9}};
+    format::append_section(bytes, {'T', 'e', 's', 't'}, unknown);
+    return bytes;
+}
+
+TEST(Format, GoldenFileWithSections) {
+    const Bytes file = golden_file("golden_v9.etree", golden_with_sections());
+    ASSERT_EQ(file.size(), second_section() + 128);
+    EXPECT_EQ(golden_with_sections(), file);
+    const auto tree = TreeView::open(file);
+    ASSERT_TRUE(tree) << tree.error().what;
+    expect_sound(*tree);
+    EXPECT_EQ(tree->format_version(), 9);
+    EXPECT_FALSE(tree->is_prefix() || tree->bake_info().inner);
+    ASSERT_EQ(tree->section_count(), 2u);
+    EXPECT_EQ(std::string(tree->section(0).kind, 4), "INNR");
+    EXPECT_EQ(std::string(tree->section(1).kind, 4), "Test");
+    EXPECT_EQ(tree->section(1).content.size(), 3u);
+    EXPECT_EQ(tree->section(1).content[2], std::byte{9});
+    const auto inner = tree->inner();
+    ASSERT_TRUE(inner);
+    expect_sound(*inner);
+    EXPECT_TRUE(inner->bake_info().inner);
+    EXPECT_TRUE(std::ranges::equal(inner->bytes(), golden_inner()));
+    const auto alone = TreeView::open(inner->bytes());
+    ASSERT_TRUE(alone) << alone.error().what;
+    EXPECT_EQ(alone->node_count(), 3u);
+    EXPECT_EQ(inner->node_count(), alone->node_count());
+    EXPECT_EQ(inner->block_count(), alone->block_count());
+    EXPECT_EQ(inner->degree(), 2u);
+    alone->for_each_node([&](uint32_t node) {
+        EXPECT_EQ(inner->ellipsoid(node), alone->ellipsoid(node));
+        EXPECT_EQ(inner->bound(node), alone->bound(node));
+    });
+    EXPECT_EQ(inner->root_bound(), alone->root_bound());
+    EXPECT_EQ(tree->scaled(2)->inner()->scale(), 2);
+    EXPECT_EQ(tree->rounded(0.5f)->inner()->radius(), 0.5f);
+    // The tree itself is as in a file without sections.
+    const Bytes plain = golden();
+    EXPECT_EQ(TreeView::open(plain)->format_version(), 8);
+    EXPECT_FALSE(TreeView::open(plain)->inner());
+    EXPECT_TRUE(std::ranges::equal(std::span(plain).subspan(kTable), std::span(file).subspan(kTable, kEnd - kTable)));
+}
+
+TEST(Format, ChangesOfSectionsAreFound) {
+    const Bytes file = golden_with_sections();
+    Exact copy(file);
+    for (const size_t at : {size_t{8}, size_t{12}, size_t{16}, size_t{24}}) {
+        copy.data[at] ^= std::byte{1};
+        EXPECT_FALSE(TreeView::open(copy.bytes())) << at;
+        copy.data[at] ^= std::byte{1};
+    }
+    for (size_t at = kEnd; at < file.size(); ++at)
+        for (const unsigned flip : {1u, 2u, 0x41u, 0x80u, 0xffu}) {
+            copy.data[at] ^= std::byte(flip);
+            ASSERT_FALSE(TreeView::open(copy.bytes())) << "byte " << at << " xor " << flip;
+            if (const auto tree = TreeView::open(copy.bytes(), kNoHash)) {
+                expect_sound(*tree);
+                if (const auto inner = tree->inner()) expect_sound(*inner);
+                for (uint32_t s = 0; s < tree->section_count(); ++s)
+                    ASSERT_LE(tree->section(s).content.data() + tree->section(s).content.size(),
+                              copy.data.get() + copy.size);
+            }
+            if (testing::Test::HasFatalFailure()) FAIL() << "byte " << at << " xor " << flip;
+            copy.data[at] ^= std::byte(flip);
+        }
+    EXPECT_TRUE(TreeView::open(copy.bytes()));
+}
+
+TEST(Format, APrefixHasNoSections) {
+    const Bytes file = golden_with_sections();
+    for (size_t n = kBlock2 + 1; n < file.size(); ++n) {
+        const Exact part({file.data(), n});
+        const auto tree = TreeView::open(part.bytes(), kNoHash);
+        ASSERT_EQ(tree.has_value(), n == kEnd) << n;
+        if (!tree) continue;
+        EXPECT_TRUE(tree->is_prefix() && !tree->inner() && tree->section_count() == 0);
+        EXPECT_EQ(tree->level_count(), 3u);
+    }
+}
+
+TEST(Format, NamesOffencesOfSections) {
+    struct Case {
+        size_t at;
+        std::vector<int> bytes;
+        uint64_t where;
+    };
+    const size_t second = second_section(), end = second + 128;
+    const Case cases[] = {
+        {8, {8}, 12},                            // version 8 has no sections
+        {12, {15}, 12},                          // nor has a file of version 9 none
+        {16, {1}, 16},                           // no multiple of 64
+        {kSection + 1, {' '}, kSection + 1},     // the kind
+        {kSection + 4, {1}, kSection + 4},       // reserved
+        {kSection + 8, {0, 0}, kSection + 8},    // no content
+        {kSection + 12, {1}, kSection + 8},      // 4 GB of it
+        {kSection + 63, {1}, kSection + 63},     // reserved
+        {kContent + 12, {15}, kContent},         // an inner cover that is none
+        {kContent + 12, {39}, kContent + 12},    // of triangles
+        {kContent, {'E'}, kContent},             // no tree
+        {second, {'I', 'N', 'N', 'R'}, second},  // another inner cover
+        {second + 64 + 3, {1}, second + 64 + 3}, // behind the content
+        {second + 8, {65}, second + 8},          // more than there is
+        {end - 1, {1}, end - 1},
+    };
+    for (const Case& c : cases) {
+        Bytes bytes = golden_with_sections();
+        for (size_t i = 0; i < c.bytes.size(); ++i) bytes[c.at + i] = std::byte(c.bytes[i]);
+        const auto tree = TreeView::open(bytes, kNoHash);
+        ASSERT_FALSE(tree) << "byte " << c.at;
+        EXPECT_EQ(tree.error().code, ErrorCode::bad_file) << "byte " << c.at << ": " << tree.error().what;
+        EXPECT_EQ(tree.error().where, c.where) << "byte " << c.at << ": " << tree.error().what;
+    }
+}
+
+TEST(Format, ACoarserTreeIsThatOfThePrefix) {
+    for (const Bytes& file : {golden(), golden_exact(), golden_with_sections()}) {
+        const TreeView whole = *TreeView::open(file);
+        for (uint32_t last = 0; last < 2; ++last) {
+            const TreeView tree = whole.coarser(last);
+            const TreeView prefix = *TreeView::open(std::span(file).first(whole.level(last).end_byte));
+            expect_sound(tree);
+            EXPECT_TRUE(tree.is_prefix() && !tree.has_triangles() && !tree.inner());
+            EXPECT_EQ(tree.bytes().size(), prefix.bytes().size());
+            EXPECT_EQ(tree.node_count(), prefix.node_count());
+            EXPECT_EQ(tree.root_bound(), prefix.root_bound());
+            prefix.for_each_node([&](uint32_t node) {
+                EXPECT_EQ(tree.is_leaf(node), prefix.is_leaf(node));
+                EXPECT_EQ(tree.ellipsoid(node), prefix.ellipsoid(node));
+                EXPECT_EQ(tree.bound(node), prefix.bound(node));
+            });
+        }
+        EXPECT_EQ(whole.coarser(2).bytes().size(), file.size());
+        EXPECT_EQ(whole.coarser(kMaxLevels).is_prefix(), false);
+    }
+}
+
 TEST(Format, NamesTheFirstOffence) {
     struct Case {
         size_t at;
@@ -595,7 +748,8 @@ TEST(Format, NamesTheFirstOffence) {
         {kBlocks + 144, {18}, ErrorCode::bad_file, kBlocks + 144},         // 22 above the step exponent, -4
         {kBlocks + 144, {0xdd}, ErrorCode::bad_file, kBlocks + 144},       // 31 below
         {kBlocks + 240, {0, 0, 0, 1}, ErrorCode::bad_file, kBlocks + 240}, // a box origin of 2^24
-        {8, {9}, ErrorCode::newer_version, 9},
+        {8, {9}, ErrorCode::bad_file, 12},                                 // without sections
+        {8, {10}, ErrorCode::newer_version, 10},
         {8, {0xff, 0xff}, ErrorCode::newer_version, 0xffff},
         {8, {0}, ErrorCode::bad_file, 8},
         {10, {128}, ErrorCode::bad_file, 10},
@@ -925,7 +1079,7 @@ TEST_F(Files, ErrorsNameTheirCause) {
 
 TEST(Version, HeaderAndLibraryAgree) {
     EXPECT_EQ(library_version(), kHeaderVersion);
-    EXPECT_EQ(kFormatVersion, 8); // a new version needs a new golden file and a row in FORMAT.md
+    EXPECT_EQ(kFormatVersion, 9); // a new version needs a new golden file and a row in FORMAT.md
 }
 
 } // namespace

@@ -9,6 +9,7 @@
 #include "src/bytes.hpp"
 
 #include <prolate/collide.hpp>
+#include <prolate/solids.hpp>
 #include <prolate/tree.hpp>
 
 #include <cmath>
@@ -67,6 +68,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     require(seen >= tree.level_count() && tree.degree() >= 2 && tree.degree() <= kMaxDegree);
     (void)tree.bake_info();
+    for (uint32_t s = 0; s < tree.section_count(); ++s) {
+        const std::span<const std::byte> content = tree.section(s).content;
+        require(!content.empty() && content.data() + content.size() <= bytes.data() + size);
+    }
+    if (const auto inner = tree.inner()) {
+        require(inner->bake_info().inner && inner->section_count() == 0);
+        inner->for_each_node([&](uint32_t n) { check(inner->ellipsoid(n)), check(inner->bound(n)); });
+    }
+    check(tree.coarser(data[size - 4] % 40u).root_bound());
     const auto holds_node = [&tree](uint32_t slot) { return slot < tree.slot_count() && tree.is_node(slot); };
     require(holds_node(0) && tree.raw().block(0) + kBlockBytes * tree.block_count() <= bytes.data() + size);
     uint32_t nodes = 0;
@@ -98,6 +108,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const float reach = static_cast<float>(data[size - 2]) / 64 * root.l11;
     const Pose tame{{reach, -reach, reach / 2}, {1, static_cast<float>(data[size - 3]), 3, 4}};
     const auto ask = [&](const Pose& a, const Pose& b) {
+        const SolidsOptions limits{.max_level = options.max_level, .max_pair_tests = options.max_pair_tests};
+        require(collide_solids(tree, a, tree, b, context, limits).stats.tests() <= limits.max_pair_tests);
         const CollideResult ab = collide(tree, a, tree, b, context, options);
         const CollideResult ba = collide(tree, b, tree, a, context, options);
         require(ab.verdict == ba.verdict && ab.stats.pair_tests == ba.stats.pair_tests);

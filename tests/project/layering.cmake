@@ -22,7 +22,7 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|poses|bounds|jobs|world|world_queries|tools|glm")
+set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|poses|bounds|jobs|solids|world|world_queries|tools|glm")
 set(query_folders "src|query")
 set(query_libraries "glm/.*|hwy/.*")
 # Inside query/: each folder may include itself and these, so queries do not know each other.
@@ -36,6 +36,7 @@ foreach(folder collide distance sweep raycast shapes points)
   set(query/${folder}_knows "${query_geometry}")
 endforeach()
 set(query/half_space_knows "${query_geometry} collide contacts distance shapes sweep")
+set(query/solids_knows "${query_geometry} collide distance")
 set(query/contacts_knows "${query_geometry} collide")
 set(query/world_knows "${query_geometry} collide contacts distance sweep raycast shapes")
 
@@ -43,11 +44,11 @@ set(builder_headers "${core_headers}|mesh|build|verify")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
-set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|bounds|poses|jobs|world|world_queries")
+set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|bounds|poses|jobs|solids|world|world_queries")
 set(capi_folders "capi")
 set(capi_libraries "prolate/prolate\\.h")
 
-set(viewer_headers "${core_headers}|query|collide|distance")
+set(viewer_headers "${core_headers}|query|collide|distance|solids")
 set(viewer_folders "viewer")
 set(viewer_libraries "none")
 

@@ -13,7 +13,7 @@ class OneTree(PageTest):
 
     @classmethod
     def setUpClass(cls):
-        bake("boxes", boxes(8), "--degree", "8", "--levels", "2")
+        bake("boxes", boxes(8), "--degree", "8", "--levels", "2", "--inner", "16")
         run("view", path("boxes.etree"), path("boxes.obj"), "-o", path(cls.page))
 
     def test_shows_as_many_ellipsoids_as_the_level_has(self):
@@ -66,6 +66,21 @@ class OneTree(PageTest):
         self.assertEqual(self.blobs(), 0)
         self.browser.keys("s")
         self.assertEqual(self.blobs(), 8)
+
+    def test_sections_show_the_inner_cover(self):
+        self.set_slider("level", 2)
+        self.browser.keys("x")
+        self.settle()
+        with_inner, width = self.shot(), self.canvas()[0]
+        self.assertTrue(self.js("viewer.state.inner"))
+        self.browser.keys("i")
+        self.settle()
+        without = self.shot()
+        inked = with_inner.inked(width)
+        changed = sum(with_inner.pixel(*at) != without.pixel(*at) for at in inked)
+        self.assertGreater(changed, 0.02 * len(inked))
+        self.assertEqual(len(inked), len(without.inked(width)), "it lies inside")
+        self.browser.keys("i")
 
     def test_hover_describes_the_node(self):
         self.set_slider("level", 1)

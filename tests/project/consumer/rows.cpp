@@ -13,6 +13,7 @@
 #include <prolate/primitives.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
+#include <prolate/solids.hpp>
 #include <prolate/sweep.hpp>
 #ifdef WITH_TBB
 #include <prolate/tbb.hpp>
@@ -37,6 +38,10 @@ int main(int argc, char** argv) {
 
     const DistanceResult d = distance(tree, here, tree, far, context);
     row("distance.hpp", d.lower > 1 && d.lower <= d.upper && d.upper < 10);
+
+    const SolidsDistance apart = distance_solids(tree, here, tree, far, context);
+    row("solids.hpp", collide_solids(tree, here, tree, far, context).verdict == Verdict::separated &&
+                          apart.verdict == Verdict::separated && apart.lower > 1 && apart.lower <= apart.upper);
 
     ContactManifolds manifolds;
     contacts(tree, here, tree, near, manifolds, context);

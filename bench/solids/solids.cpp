@@ -1,0 +1,223 @@
+// How much covers from outside and inside decide without a triangle, and at what price.
+//
+//   bench_solids MESH... [--ellipsoids N] [--inner N] [--poses N] [--quality fast|normal|best]
+//
+// A body meets itself: both are turned at random, and B comes along a random direction until the solids first meet, at
+// t, by bisection with exact trees. Poses are then t plus a random part of +-1, 5 or 20 % of the diagonal. Printed are,
+// for covers of ellipsoids and of as many spheres: the share of poses that collide_solids() decides, apart and meeting;
+// the median time of a query; the mean width of the band that distance_solids() leaves, % of the diagonal; and what a
+// query costs on average if exact trees are asked where covers do not decide, beside exact trees alone. Every decision
+// is compared with that of the exact trees; the program fails if one is wrong.
+#include "tests/scenes.hpp"
+
+#include <prolate/build.hpp>
+#include <prolate/collide.hpp>
+#include <prolate/solids.hpp>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using scenes::Point;
+using scenes::Random;
+
+constexpr double kBands[] = {0.01, 0.05, 0.2}; // of the diagonal
+constexpr int kBisections = 16;
+constexpr int kRepeats = 16; // of a query, to be timed
+
+struct Settings {
+    uint32_t ellipsoids = 64, inner = 64, poses = 2000;
+    std::string quality = "normal";
+};
+
+struct Placed {
+    Pose a, b;
+};
+
+Build bake(const Mesh& mesh, const BuildOptions& options) {
+    auto built = build(mesh.view(), options);
+    if (!built) throw std::runtime_error(built.error().what);
+    return std::move(*built);
+}
+
+class Comparison {
+public:
+    Comparison(const Mesh& mesh, const Settings& settings) : settings_(settings) {
+        const Clock::time_point start = Clock::now();
+        BuildOptions exact;
+        exact.exact = true, exact.inner = settings.inner;
+        exact_ = std::make_unique<Build>(bake(mesh, exact));
+        for (const Primitive primitive : {Primitive::ellipsoid, Primitive::sphere}) {
+            BuildOptions options;
+            options.ellipsoids = settings.ellipsoids, options.inner = settings.inner, options.primitive = primitive;
+            options.quality = settings.quality == "fast"   ? Quality::fast
+                              : settings.quality == "best" ? Quality::best
+                                                           : Quality::normal;
+            covers_.push_back(std::make_unique<Build>(bake(mesh, options)));
+        }
+        fmt::print("  baked in {:.1f} s; outside ratio, share of the solid inside: ellipsoids {:.3f}, {:.3f}; spheres "
+                   "{:.3f}, {:.3f}; bytes {} and {}, exact {}\n",
+                   std::chrono::duration<double>(Clock::now() - start).count(), outside(0), inside(0), outside(1),
+                   inside(1), covers_[0]->tree.bytes().size(), covers_[1]->tree.bytes().size(),
+                   exact_->tree.bytes().size());
+        fmt::print("  {:>6} {:>10} {:>8} {:>8} {:>8} {:>8} {:>9} {:>10}\n", "within", "covers", "decided", "apart",
+                   "meeting", "us", "band %", "us in all");
+    }
+
+    // False if a decision was wrong.
+    bool run(double band) {
+        const std::vector<Placed> poses = poses_within(band);
+        std::vector<Verdict> truth;
+        std::vector<double> exact_times;
+        const TreeView exact = exact_->tree.view();
+        for (const Placed& p : poses) {
+            truth.push_back(collide(exact, p.a, exact, p.b, *context_).verdict);
+            exact_times.push_back(time([&] { return collide(exact, p.a, exact, p.b, *context_).verdict; }));
+        }
+        bool right = true;
+        for (size_t k = 0; k < covers_.size(); ++k)
+            right =
+                compare(band, k == 0 ? "ellipsoids" : "spheres", covers_[k]->tree.view(), poses, truth, exact_times) &&
+                right;
+        fmt::print("  {:>5.0f}% {:>10} {:>8} {:>8.3f} {:>8.3f} {:>8.2f} {:>9} {:>10.2f}\n", 100 * band, "exact", "",
+                   share(truth, Verdict::separated), share(truth, Verdict::overlapping), median(exact_times), "",
+                   mean(exact_times));
+        // Exact trees whose inner covers are asked first.
+        std::vector<double> helped;
+        for (size_t i = 0; i < poses.size(); ++i) {
+            const Placed& p = poses[i];
+            right = right && collide_solids(exact, p.a, exact, p.b, *context_).verdict == truth[i];
+            helped.push_back(time([&] { return collide_solids(exact, p.a, exact, p.b, *context_).verdict; }));
+        }
+        fmt::print("  {:>6} {:>10} {:>8} {:>8} {:>8} {:>8.2f} {:>9} {:>10.2f}\n", "", "with inner", "", "", "",
+                   median(helped), "", mean(helped));
+        return right;
+    }
+
+private:
+    double outside(size_t k) const { return covers_[k]->levels.back().outside_ratio; }
+    double inside(size_t k) const {
+        const TreeView inner = *covers_[k]->tree.view().inner();
+        return inner.level(inner.level_count() - 1).union_volume / covers_[k]->solid_volume;
+    }
+    static double share(const std::vector<Verdict>& verdicts, Verdict of) {
+        return static_cast<double>(std::count(verdicts.begin(), verdicts.end(), of)) /
+               static_cast<double>(verdicts.size());
+    }
+    static double median(std::vector<double> values) {
+        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+        std::nth_element(values.begin(), middle, values.end());
+        return *middle;
+    }
+    static double mean(const std::vector<double>& values) {
+        double sum = 0;
+        for (const double v : values) sum += v;
+        return sum / static_cast<double>(values.size());
+    }
+    // Microseconds of one call: the better of two rounds.
+    template <class Query> double time(const Query& query) {
+        double best = HUGE_VAL;
+        for (int round = 0; round < 2; ++round) {
+            const Clock::time_point start = Clock::now();
+            for (int i = 0; i < kRepeats; ++i) sink_ += static_cast<uint64_t>(query());
+            best = std::min(best, std::chrono::duration<double, std::micro>(Clock::now() - start).count() / kRepeats);
+        }
+        return best;
+    }
+
+    std::vector<Placed> poses_within(double band) {
+        const double diagonal = exact_->diagonal;
+        const TreeView exact = exact_->tree.view();
+        Random random(11);
+        std::vector<Placed> out;
+        while (out.size() < settings_.poses) {
+            Placed p;
+            p.a.rotation = random.rotation(), p.b.rotation = random.rotation();
+            const Point d = random.direction();
+            const auto at = [&](double t) {
+                p.b.translation = scenes::to_float({t * d[0], t * d[1], t * d[2]});
+                return p;
+            };
+            double low = 0, high = 3 * diagonal;
+            for (int i = 0; i < kBisections; ++i) {
+                const double middle = (low + high) / 2;
+                at(middle);
+                (collide(exact, p.a, exact, p.b, *context_).verdict == Verdict::overlapping ? low : high) = middle;
+            }
+            out.push_back(at(high + band * diagonal * random.in(-1, 1)));
+        }
+        return out;
+    }
+
+    bool compare(double band, const char* name, const TreeView& tree, const std::vector<Placed>& poses,
+                 const std::vector<Verdict>& truth, const std::vector<double>& exact_times) {
+        std::vector<double> times, in_all;
+        std::vector<Verdict> verdicts;
+        double width = 0;
+        size_t wrong = 0;
+        for (size_t i = 0; i < poses.size(); ++i) {
+            const Placed& p = poses[i];
+            const Verdict verdict = collide_solids(tree, p.a, tree, p.b, *context_).verdict;
+            wrong += verdict != Verdict::undecided && verdict != truth[i];
+            verdicts.push_back(verdict);
+            times.push_back(time([&] { return collide_solids(tree, p.a, tree, p.b, *context_).verdict; }));
+            in_all.push_back(times.back() + (verdict == Verdict::undecided ? exact_times[i] : 0));
+            const SolidsDistance d = distance_solids(tree, p.a, tree, p.b, *context_, {.tolerance_relative = 1e-3});
+            width += d.upper - d.lower;
+        }
+        fmt::print("  {:>5.0f}% {:>10} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.2f} {:>9.2f} {:>10.2f}\n", 100 * band, name,
+                   1 - share(verdicts, Verdict::undecided), share(verdicts, Verdict::separated),
+                   share(verdicts, Verdict::overlapping), median(times),
+                   100 * width / exact_->diagonal / static_cast<double>(poses.size()), mean(in_all));
+        if (wrong > 0) fmt::print("  {} of {} decisions are WRONG\n", wrong, poses.size());
+        return wrong == 0;
+    }
+
+    const Settings& settings_;
+    std::unique_ptr<Build> exact_;
+    std::vector<std::unique_ptr<Build>> covers_;
+    std::unique_ptr<QueryContext> context_ = std::make_unique<QueryContext>();
+    uint64_t sink_ = 0; // so that no query is left out
+};
+
+int run(const std::vector<std::string>& meshes, const Settings& settings) {
+    bool right = true;
+    for (const std::string& path : meshes) {
+        const auto mesh = load_mesh(path.c_str());
+        if (!mesh) return fmt::print(stderr, "{}: {}\n", path, mesh.error().what), 1;
+        fmt::print("{}\n", path);
+        Comparison comparison(*mesh, settings);
+        for (const double band : kBands) right = comparison.run(band) && right;
+    }
+    return right ? 0 : 1;
+}
+
+} // namespace
+} // namespace prolate
+
+int main(int argc, char** argv) {
+    CLI::App app{"Covers from outside and inside, beside exact trees"};
+    std::vector<std::string> meshes;
+    prolate::Settings settings;
+    app.add_option("mesh", meshes, "closed meshes")->required();
+    app.add_option("--ellipsoids", settings.ellipsoids, "outside")->capture_default_str();
+    app.add_option("--inner", settings.inner, "inside")->capture_default_str();
+    app.add_option("--poses", settings.poses, "for each band")->capture_default_str();
+    app.add_option("--quality", settings.quality, "of the outer covers")->capture_default_str();
+    CLI11_PARSE(app, argc, argv);
+    try {
+        return prolate::run(meshes, settings);
+    } catch (const std::exception& error) {
+        return fmt::print(stderr, "{}\n", error.what()), 1;
+    }
+}
