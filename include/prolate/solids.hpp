@@ -12,9 +12,9 @@
 //
 // Which trees: of a tree without triangles, all levels are covers by themselves, and max_level chooses one of the outer
 // and one of the inner cover. Without an inner cover, nothing is certain to meet or to be near. An exact tree is the
-// solid: its triangles decide what its inner cover, if it has one, leaves open, and max_level does not limit them. A
-// prefix of an exact tree is no solid: undecided. So is a body that is rounded() more than it should be: nothing here
-// knows what was meant, and radii count as parts of the solids.
+// solid itself, and max_level does not limit it: two of them are asked as collide() and distance() ask them; against a
+// tree without triangles, an inner cover that it has stands for it where bodies meet. A prefix of an exact tree is no
+// solid: undecided. The radius of a rounded() tree is part of the solid.
 #pragma once
 
 #include <prolate/distance.hpp>
