@@ -11,6 +11,7 @@
 
 #include <prolate/collide.hpp>
 #include <prolate/pairs.hpp>
+#include <prolate/poses.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -138,6 +139,44 @@ BENCHMARK_CAPTURE(tree_tree, 3_levels_near, 3u, 0.01);
 BENCHMARK_CAPTURE(tree_tree, 4_levels_near, 4u, 0.01);
 BENCHMARK_CAPTURE(tree_tree, 4_levels_touching, 4u, -0.01);
 BENCHMARK_CAPTURE(tree_tree, 4_levels_far, 4u, 5.0);
+
+// collide() at 4096 poses in turn, or collide_poses() of them in one call: a body anywhere in a box `spread` times as
+// wide as another in its middle, as a planner's samples are. Time is that of a pose.
+void at_poses(benchmark::State& state, double spread, bool one_call) {
+    Random random(3);
+    const auto make = [&] {
+        return scenes::tree(random, scenes::cloud(random, 8192), {.levels = 4, .leaf_points = 2});
+    };
+    const auto scene_a = make(), scene_b = make();
+    const TreeView a = *TreeView::open(scene_a.bytes), b = *TreeView::open(scene_b.bytes);
+    QueryContext context;
+    const Pose still;
+    std::vector<Pose> poses(4096);
+    for (Pose& pose : poses) {
+        pose.rotation = random.rotation();
+        const double x = random.in(-spread, spread), y = random.in(-spread, spread), z = random.in(-spread, spread);
+        pose.translation = scenes::to_float({x, y, z});
+    }
+    std::vector<Verdict> out(poses.size());
+    for (auto _ : state) {
+        if (one_call) {
+            benchmark::DoNotOptimize(collide_poses(a, {&still, 1}, b, poses, out, {&context, 1}));
+        } else {
+            for (size_t i = 0; i < poses.size(); ++i) out[i] = collide(a, still, b, poses[i], context).verdict;
+        }
+        benchmark::ClobberMemory();
+    }
+    Hash hash;
+    double apart = 0;
+    for (const Verdict verdict : out) hash.add(static_cast<uint64_t>(verdict)), apart += verdict == Verdict::separated;
+    state.SetItemsProcessed(static_cast<int64_t>(state.iterations() * poses.size()));
+    state.counters["apart"] = apart / static_cast<double>(poses.size());
+    state.counters["verdicts"] = hash.value();
+}
+BENCHMARK_CAPTURE(at_poses, wide_one_by_one, 4.0, false);
+BENCHMARK_CAPTURE(at_poses, wide_in_one_call, 4.0, true);
+BENCHMARK_CAPTURE(at_poses, narrow_one_by_one, 2.0, false);
+BENCHMARK_CAPTURE(at_poses, narrow_in_one_call, 2.0, true);
 
 } // namespace
 } // namespace prolate

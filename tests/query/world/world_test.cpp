@@ -1,8 +1,10 @@
 // Worlds: no pair is missed, lists do not depend on threads, and everything refuses what it should.
 #include "query/world/bounds.hpp"
 #include "tests/scenes.hpp"
+#include "tests/targets.hpp"
 #include "tests/threads.hpp"
 
+#include <prolate/pairs.hpp>
 #include <prolate/poses.hpp>
 #include <prolate/world.hpp>
 #include <prolate/world_queries.hpp>
@@ -392,23 +394,70 @@ TEST(World, CollidesAsCollideDoes) {
     }
 
     std::vector<Pose> poses;
-    for (uint32_t i = 0; i < 500; ++i) poses.push_back(random_pose(random, 1.5));
+    for (uint32_t i = 0; i < 500; ++i) poses.push_back(random_pose(random, i % 4 == 0 ? 4 : 1.5));
+    poses[17].translation.y = std::numeric_limits<float>::quiet_NaN(), poses[18].rotation = {0, 0, 0, 0};
+    poses[19].translation.x = std::numeric_limits<float>::infinity();
     results.resize(500);
     const Pose still = random_pose(random, 1);
     for (const bool a_moves : {false, true}) {
         const std::span<const Pose> many(poses), one(&still, 1);
         ASSERT_TRUE(collide_poses(tree(2), a_moves ? many : one, tree(3), a_moves ? one : many, results, contexts,
                                   thread_jobs(3)));
-        uint32_t meeting = 0;
+        uint32_t meeting = 0, by_roots = 0;
         for (uint32_t i = 0; i < 500; ++i) {
             const auto single =
                 collide(tree(2), a_moves ? poses[i] : still, tree(3), a_moves ? still : poses[i], contexts[0]);
             EXPECT_EQ(results[i].verdict, single.verdict);
+            EXPECT_EQ(results[i].enclosed, single.enclosed);
+            EXPECT_LE(results[i].stats.tests(), single.stats.tests());
             meeting += single.verdict == Verdict::overlapping;
+            by_roots += single.stats.block_tests > 0 && results[i].stats.block_tests == 0;
         }
+        EXPECT_GT(by_roots, 20u);
         EXPECT_GT(meeting, 20u);
         EXPECT_LT(meeting, 480u);
     }
+}
+
+// A body is moved along a line to where the ellipsoids of the roots just come apart, and there around.
+TEST(World, RootsAreApartOnlyWhereEllipsoidsAre) {
+    Random random(16);
+    QueryContext context;
+    int apart = 0, near = 0;
+    targets::for_each([&](const char* name) {
+        for (int n = 0; n < 60; ++n) {
+            const TreeView &a = tree(n % 4), &b = tree(n % 3);
+            const Pose still = random_pose(random, n % 3 == 0 ? 1e3 : 1), turned = random_pose(random, 1);
+            const auto margin = static_cast<float>(n % 5 == 0 ? 0.25 : 0);
+            const auto at = [&](double x) {
+                Pose out = turned;
+                out.translation = still.translation;
+                out.translation.x += static_cast<float>(x);
+                return out;
+            };
+            const auto separated = [&](const Pose& pose) {
+                return collide(a.root_bound(), still, b.root_bound(), pose, margin) == Verdict::separated;
+            };
+            double low = 0, high = 20;
+            std::vector<Pose> poses;
+            for (int k = 0; k < 40; ++k) {
+                const double middle = 0.5 * (low + high);
+                poses.push_back(at(middle));
+                (separated(poses.back()) ? high : low) = middle;
+            }
+            std::vector<CollideResult> results(poses.size());
+            ASSERT_TRUE(collide_poses(a, {&still, 1}, b, poses, results, {&context, 1}, {}, {.margin = margin}));
+            for (size_t i = 0; i < poses.size(); ++i) {
+                const auto single = collide(a, still, b, poses[i], context, {.margin = margin});
+                ASSERT_EQ(results[i].verdict, single.verdict) << name;
+                const bool by_roots = results[i].verdict == Verdict::separated && results[i].stats.block_tests == 0;
+                ASSERT_TRUE(!by_roots || separated(poses[i])) << name << ' ' << n << ' ' << i;
+                apart += by_roots, near += !by_roots && separated(poses[i]);
+            }
+        }
+    });
+    EXPECT_GT(apart, 2000);
+    EXPECT_GT(near, 1000); // too near for it; of random poses there are next to none
 }
 
 TEST(World, SlotsLastAsLongAsPairs) {
