@@ -206,6 +206,26 @@ prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch
     return PROLATE_OK;
 }
 
+prolate_status prolate_raycasts(prolate_body body, const prolate_ray* rays, size_t count, void* scratch,
+                                size_t scratch_size, const prolate_query_options* options, prolate_tree_hit* hits) {
+    auto given = fresh<prolate_query_options>();
+    if (view_of(body.tree) == nullptr || !enough(scratch, scratch_size, body.tree)) return PROLATE_BAD_ARGUMENT;
+    if (!read(options, given)) return PROLATE_BAD_STRUCT;
+    if (count > 0 && (rays == nullptr || hits == nullptr)) return PROLATE_BAD_ARGUMENT;
+    constexpr size_t kAtOnce = 16; // on the stack
+    RaycastResult some[kAtOnce];
+    for (size_t i = 0; i < count; i += kAtOnce) {
+        const size_t now = std::min(kAtOnce, count - i);
+        raycast(*view_of(body.tree), same<Pose>(body.pose), {reinterpret_cast<const Ray*>(rays) + i, now}, {some, now},
+                scratch_of(scratch, scratch_size), capi::options_of(given));
+        for (size_t k = 0; k < now; ++k)
+            hits[i + k] = {
+                verdict_of(some[k].verdict),        some[k].t,    some[k].clear,   same<prolate_vec3>(some[k].point),
+                same<prolate_vec3>(some[k].normal), some[k].node, some[k].triangle};
+    }
+    return PROLATE_OK;
+}
+
 prolate_status prolate_overlap(prolate_body body, const prolate_shape* shape, void* scratch, size_t scratch_size,
                                const prolate_query_options* options, prolate_overlap_result* result) {
     auto given = fresh<prolate_query_options>();

@@ -325,6 +325,16 @@ typedef struct prolate_raycast_result {
 /** raycast.hpp: raycast(). */
 PROLATE_API prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch, size_t scratch_size,
                                            const prolate_query_options* options, prolate_raycast_result* result);
+/** raycast.hpp: raycast() of many rays: a hit for each. */
+typedef struct prolate_tree_hit {
+    prolate_verdict verdict;
+    double t, clear;
+    prolate_vec3 point, normal;
+    uint32_t node, triangle;
+} prolate_tree_hit;
+PROLATE_API prolate_status prolate_raycasts(prolate_body body, const prolate_ray* rays, size_t count, void* scratch,
+                                            size_t scratch_size, const prolate_query_options* options,
+                                            prolate_tree_hit* hits);
 
 /** shapes.hpp: HalfSpace. */
 typedef struct prolate_half_space {

@@ -165,6 +165,22 @@ static void test_one_body(void) {
     CHECK_OK(prolate_raycast(at(&box, 0, 0, 0), ray, scratch, scratch_size, NULL, &r));
     CHECK(r.verdict == PROLATE_OVERLAPPING && fabs(r.t - 4.5) < 1e-5 && fabsf(r.normal.x + 1) < 1e-5f);
 
+    prolate_ray rays[20]; /* more than are cast at once */
+    prolate_tree_hit hits[20];
+    for (int i = 0; i < 20; ++i) {
+        rays[i] = ray;
+        rays[i].origin.y = 0.05f * (float)i;
+    }
+    CHECK_OK(prolate_raycasts(at(&box, 0, 0, 0), rays, 20, scratch, scratch_size, NULL, hits));
+    for (int i = 0; i < 20; ++i) {
+        CHECK_OK(prolate_raycast(at(&box, 0, 0, 0), rays[i], scratch, scratch_size, NULL, &r));
+        CHECK(hits[i].verdict == r.verdict && hits[i].t == r.t && hits[i].triangle == r.triangle);
+        CHECK(hits[i].verdict == (i <= 10 ? PROLATE_OVERLAPPING : PROLATE_SEPARATED));
+    }
+    CHECK_OK(prolate_raycasts(at(&box, 0, 0, 0), NULL, 0, scratch, scratch_size, NULL, NULL));
+    CHECK_STATUS(prolate_raycasts(at(&box, 0, 0, 0), NULL, 1, scratch, scratch_size, NULL, hits), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_raycasts(at(&box, 0, 0, 0), rays, 1, scratch, 0, NULL, hits), PROLATE_BAD_ARGUMENT);
+
     const prolate_half_space ground = {{0, 0, 1}, 0};
     prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
     CHECK_OK(prolate_half_space_distance(at(&box, 0, 0, 2), ground, scratch, scratch_size, NULL, &d));

@@ -103,6 +103,10 @@ void query(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scr
     const prolate_ray ray{in.vector(), in.vector(), in.number()};
     auto r = fresh<prolate_raycast_result>();
     require(prolate_raycast(a, ray, memory, room, &options, &r) == PROLATE_OK);
+    const prolate_ray rays[] = {ray, {in.vector(), ray.direction, in.number()}};
+    prolate_tree_hit hits[2];
+    require(prolate_raycasts(a, rays, 2, memory, room, &options, hits) == PROLATE_OK);
+    require(hits[0].verdict == r.verdict);
     const prolate_vec3 points[] = {in.vector(), in.vector(), in.vector()};
     prolate_signed_distance signed_distances[3];
     prolate_verdict sides[3];
