@@ -16,9 +16,9 @@ namespace {
 // point is what the plane goes through.
 constexpr double kOnPlane = 1e-9;
 
-class Search {
+class ObstacleSearch {
 public:
-    Search(const Fit& ellipsoid, const TriangleTree& surface, double most)
+    ObstacleSearch(const Fit& ellipsoid, const TriangleTree& surface, double most)
         : ellipsoid_(ellipsoid), surface_(surface), most_(most) {
         if (!surface.nodes().empty()) push_node(0);
     }
@@ -109,7 +109,7 @@ private:
 } // namespace
 
 std::vector<Obstacle> obstacles(const Fit& ellipsoid, const TriangleTree& surface, double most, size_t count) {
-    return Search(ellipsoid, surface, most).run(count);
+    return ObstacleSearch(ellipsoid, surface, most).run(count);
 }
 
 double clearance(const Fit& ellipsoid, const TriangleTree& surface, double most) {
