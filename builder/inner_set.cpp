@@ -230,7 +230,8 @@ InsideLattice::InsideLattice(const DistanceField& field) : field_(field) {
 
 Vec InsideLattice::place(uint32_t index) const {
     const auto ny = static_cast<uint32_t>(field_.size()[1]), nz = static_cast<uint32_t>(field_.size()[2]);
-    return field_.origin() + field_.pitch() * Vec(index / (ny * nz), index / nz % ny, index % nz);
+    const uint32_t i = index / (ny * nz), j = index / nz % ny, k = index % nz;
+    return field_.origin() + field_.pitch() * Vec(i, j, k);
 }
 
 std::vector<Fit> inner_set(const TriangleTree& surface, const DistanceField& field, const InnerSetOptions& options) {

@@ -116,6 +116,17 @@ bool suits(const BakeInfo& info, MeshView mesh) {
     return true;
 }
 
+// Does the ball of keep_holes pass the leaves?
+void prove_holes(const TreeView& tree, MeshView surface, VerifyReport& report) {
+    std::vector<Ellipsoid> leaves;
+    tree.for_each_in_cut(tree.level_count() - 1, [&](uint32_t node) { leaves.push_back(tree.ellipsoid(node)); });
+    const Passages passages(surface, double{tree.bake_info().keep_holes});
+    const Passages::Nearest nearest = passages.nearest(leaves);
+    report.holes_kept = nearest.distance >= passages.needed();
+    std::copy_n(nearest.place.data(), 3, report.blocked);
+    report.covered = report.covered && report.holes_kept;
+}
+
 Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::function<void(double)>& progress) {
     auto cleaned = clean(mesh, tree.bake_info().weld);
     if (!cleaned) return cleaned.error();
@@ -166,15 +177,7 @@ Result<VerifyReport> prove_all(const TreeView& tree, MeshView mesh, const std::f
             for (CoverNode& shape : all)
                 if (shape.parent == &all[0]) shape.parent = nullptr;
     }
-    if (info.keep_holes > 0 && !tree.is_prefix()) {
-        std::vector<Ellipsoid> leaves;
-        tree.for_each_in_cut(tree.level_count() - 1, [&](uint32_t node) { leaves.push_back(tree.ellipsoid(node)); });
-        const Passages passages(surface, double{info.keep_holes});
-        const Passages::Nearest nearest = passages.nearest(leaves);
-        report.holes_kept = nearest.distance >= passages.needed();
-        std::copy_n(nearest.place.data(), 3, report.blocked);
-        report.covered = report.covered && report.holes_kept;
-    }
+    if (info.keep_holes > 0 && !tree.is_prefix()) prove_holes(tree, surface, report);
     return report;
 }
 
