@@ -18,6 +18,7 @@ import numpy as np
 import prolate
 from prolate.robots._baked import BakedRobot
 from prolate.robots._robot import Robot
+from prolate.robots._touch import touches
 from prolate.robots._write_mjcf import write_mjcf
 
 ROBOTS = {  # folder and file of the package, and whether it stands on a floor by itself
@@ -72,7 +73,7 @@ def resting_height(robot: BakedRobot, folder: Path) -> float:
     return float(data.qpos[2])
 
 
-def fall(robot: BakedRobot, folder: Path, exclude: list[tuple[str, str]], seconds: float) -> tuple[float, float]:
+def fall(robot: BakedRobot, exclude: list[tuple[str, str]], folder: Path, seconds: float) -> tuple[float, float]:
     """Steps a second of CPU while the limp robot falls and lies, and contacts a step."""
     path = folder / "limp.xml"
     write_mjcf(robot, path, floating=True, visuals=False, exclude=exclude)
@@ -140,17 +141,19 @@ def one(name: str, file: Path, stands: bool, folder: Path, options: argparse.Nam
         exclude = touching(own, folder)
         more = [pair for pair in touching(baked, folder) if pair not in exclude]
         print(f"    touching at 0: {len(exclude)} pairs of links, by covers {len(more)} more")
+        never = [pair for pair, why in touches(own, baked).disabled().items() if why == "never"]
+        both = exclude + more
+        ways = ((own, both), (baked, both), (baked, both + never))
         # In turns, and the median of the turns' ratios: other programs disturb these.
-        falls = np.array(
-            [[fall(r, folder, exclude + more, options.seconds) for r in (own, baked)] for _ in range(options.rounds)]
-        )
-        (by_hulls, contacts_of_hulls), (by_covers, contacts) = np.median(falls, axis=0)
-        ratios = falls[:, 1, 0] / falls[:, 0, 0]
+        falls = np.array([[fall(*way, folder, options.seconds) for way in ways] for _ in range(options.rounds)])
+        (by_hulls, contacts_of_hulls), (by_covers, contacts), _ = np.median(falls, axis=0)
+        ratios = falls[:, 1:, 0] / falls[:, :1, 0]
+        ratio, without = (f"{np.median(one):.2f}, {one.min():.2f} to {one.max():.2f}" for one in ratios.T)
         print(
-            f"    MuJoCo: {by_covers:.0f} steps a second by covers, {by_hulls:.0f} by the meshes' hulls "
-            f"({np.median(ratios):.2f}, {ratios.min():.2f} to {ratios.max():.2f}); contacts a step {contacts:.1f} and "
-            f"{contacts_of_hulls:.1f}"
+            f"    MuJoCo: {by_covers:.0f} steps a second by covers, {by_hulls:.0f} by the meshes' hulls ({ratio}); "
+            f"contacts a step {contacts:.1f} and {contacts_of_hulls:.1f}"
         )
+        print(f"    without the {len(never)} pairs of links that never touched in 10,000 samples: {without}")
         if stands:
             heights = [resting_height(r, folder) for r in (own, baked)]
             print(f"    rests {1000 * (heights[1] - heights[0]):+.2f} mm higher by covers than by the meshes' hulls")

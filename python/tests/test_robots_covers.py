@@ -250,7 +250,7 @@ def test_a_shell_is_covered_by_hulls_that_are_proved_and_no_larger_than_its_own(
     corners = np.concatenate([moved(one.pose, one.shape.vertices) for one in found.geometries])
     assert beyond([around_it], corners).max() <= (1e-5 if closed else 5e-4)  # flat sides stay flat
     if closed:
-        assert found.outside_ratio < 0.3
+        assert found.outside_ratio < 0.4
 
 
 def test_flat_pieces_get_a_volume() -> None:

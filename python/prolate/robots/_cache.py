@@ -21,7 +21,7 @@ from ._model import BoxShape, CapsuleShape, CylinderShape, EllipsoidShape, Geome
 _SHAPES: dict[str, Any] = {
     kind.__name__: kind for kind in (BoxShape, CapsuleShape, CylinderShape, EllipsoidShape, SphereShape)
 }
-_FORMAT = 3  #: rises whenever the same links and options give other covers
+_FORMAT = 4  #: rises whenever the same links and options give other covers
 
 
 def key_of(links: Sequence[Link], options: object) -> str:

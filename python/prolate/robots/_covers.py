@@ -44,6 +44,8 @@ KEEPS: dict[type, set[Kind]] = {
 SINGLE: tuple[Kind, ...] = ("box", "capsule", "cylinder", "sphere")
 KINDS: tuple[Kind, ...] = ("hull", *SINGLE, "ellipsoids", "spheres")
 WORTH = 0.01  #: part of a cover's volume that is worth no more of a cost
+FURTHER = 0.05  #: part of a link's volume that a further hull must gain, as each costs time wherever the robot is
+CONVEX = 1e-6  #: part of its hull's volume that a convex mesh may lack, by rounding
 NEGLIGIBLE = 0.005  #: part of a cover's volume that is not worth a bake
 COUNTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  #: of convex pieces that are tried
 VERTICES_OF_ONE = 256  #: of a hull that costs as much as one ellipsoid
@@ -103,6 +105,11 @@ class Solid:
         self.growth = self.rounding + 4e-7 * float(np.abs(self.vertices).max(initial=0.0))
 
     @cached_property
+    def size(self) -> float:
+        """The longest edge of a box around it, metres. What is flat becomes a part of that thick."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @cached_property
     def points(self) -> Matrix:
         """The corners of the convex hull; none of flat meshes."""
         try:
@@ -141,7 +148,7 @@ class Solid:
             vertices = merged([one])[0]
             if is_flat(vertices):
                 return []
-            hulls.append((grown(hull_within(vertices, most), self.growth), vertices))
+            hulls.append((grown(hull_within(thickened(vertices, self.size), most), self.growth), vertices))
         proved = all(holds_points(hull, vertices) for hull, vertices in hulls)
         bodies = tuple(hull for hull, _ in hulls)
         return [Cover("hull", bodies, sum(volume(hull.shape) for hull in bodies), proved)]
@@ -157,7 +164,7 @@ class Solid:
         if not self.has_hulls:
             return None
         hull = volume_of_hull(self.points)
-        if hull - self.volume <= NEGLIGIBLE * hull:
+        if hull - self.volume <= CONVEX * hull:
             return None
         return Pieces(self.vertices, self.faces, self.exact, self.options.threads)
 
@@ -172,8 +179,8 @@ class Solid:
                 yield self._hulls[count]
 
     def _around_pieces(self, pieces: list[Matrix]) -> Cover:
-        most, size = self.options.max_hull_vertices, float(np.ptp(self.vertices, axis=0).max())
-        bodies = tuple(grown(hull_within(thickened(points, size), most), self.growth) for points in pieces)
+        most = self.options.max_hull_vertices
+        bodies = tuple(grown(hull_within(thickened(points, self.size), most), self.growth) for points in pieces)
         # By half: to cut triangles rounds, too, by much less.
         proved = all(holds_points(hull, points, self.growth / 2) for hull, points in zip(bodies, pieces))
         return Cover("hull", bodies, sum(volume(hull.shape) for hull in bodies), proved)
@@ -186,7 +193,7 @@ class Solid:
             return []
         found = []
         if self.has_hulls:
-            found = [self._around("hull", hull_within(self.points, most)), *self._parts()]
+            found = [self._around("hull", hull_within(thickened(self.points, self.size), most)), *self._parts()]
         if not found or found[0].volume > (1 + WORTH) * volume_of_hull(self.points):  # or else none can be much smaller
             found += [self._around(kind, around(self.points, kind)) for kind in kinds if kind in SINGLE]
         return found
@@ -339,7 +346,7 @@ def _step(solid: Solid, now: Cover, spare: float) -> Cover | None:
         most = 0
     elif solid.has_hulls:
         pieces = solid.hulls(spare + now.cost)
-        options += [one for one in pieces if one.cost > now.cost and _gain(now, one) > WORTH * now.volume]
+        options += [one for one in pieces if one.cost > now.cost and _gain(now, one) > FURTHER * now.volume]
         most = 0
     else:
         most = min(int(spare + now.cost), solid.options.max_ellipsoids) if solid.baked_kind else 0

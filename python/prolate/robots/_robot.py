@@ -57,7 +57,7 @@ class Robot:
             body of least outside volume times cost that sticks out by no more, or hulls of pieces, or ellipsoids.
         ellipsoids : int, optional
             What all covers may cost together, spread over the links where the next step gains most outside volume. A
-            further hull must gain 1 % of a link's.
+            further hull must gain 5 % of a link's.
         exact : bool
             Keep the meshes; trees are then exact, as planners want them.
         only : kind or tuple of kinds, optional

@@ -11,7 +11,7 @@ import numpy as np
 
 from ._baked import BakedRobot
 from ._checks import Checks
-from ._model import Description
+from ._model import Description, MeshShape
 from ._robot import Robot
 from ._srdf import pair_of
 from ._write_srdf import write_srdf
@@ -158,8 +158,8 @@ def mend(
     """Covers that seldom bring links into contact whose meshes are not.
 
     Links that touch by their covers alone, at home or in more than ``most`` of the samples, are covered anew: to stick
-    out by half as much, by up to four times as many ellipsoids. So they stay checked, where excluding the pair would
-    hide real contacts.
+    out by half as much, by up to four times as many bodies, and hulls of four times as many vertices. So they stay
+    checked, where excluding the pair would hide real contacts.
 
     Parameters
     ----------
@@ -201,8 +201,11 @@ def _closer(robot: BakedRobot, names: set[str], **options: Any) -> BakedRobot:
     now = {name: robot.covers[name] for name in names}
     limits = {name: cover.clearance / 2 for name, cover in now.items()}
     bodies = 4 * max(16, *(len(cover.geometries) for cover in now.values()))
+    hulls = [one.shape for cover in now.values() for one in cover.geometries if isinstance(one.shape, MeshShape)]
+    corners = 4 * max([64, *(len(hull.vertices) for hull in hulls)])
+    more = {**options, "max_ellipsoids": bodies, "max_hull_vertices": corners}
     part = Robot(replace(robot.description, links=links))
-    baked = part.bake(clearance=max(limits.values()), finer=limits, **{**options, "max_ellipsoids": bodies})
+    baked = part.bake(clearance=max(limits.values()), finer=limits, **more)
     better = {name: one for name, one in baked.covers.items() if one.proved and one.clearance < now[name].clearance}
     return replace(baked, covers=better)
 
