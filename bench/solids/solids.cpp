@@ -76,7 +76,7 @@ public:
                    "apart", "meeting", "us", "us in all", "band %", "distance us");
     }
 
-    // False if a decision was wrong.
+    // False if an answer was wrong.
     bool run(double band) {
         const std::vector<Placed> poses = poses_within(band);
         std::vector<Verdict> truth;
@@ -98,6 +98,7 @@ public:
         fmt::print("  {:>5.0f}% {:>10} {:>8} {:>8.3f} {:>8.3f} {:>8.2f} {:>10.2f} {:>8} {:>12.2f}\n", 100 * band,
                    "exact", "", share(truth, Verdict::separated), share(truth, Verdict::overlapping),
                    median(exact_times), mean(exact_times), "", median(distance_times));
+        print_levels(poses);
         return right;
     }
 
@@ -120,6 +121,24 @@ private:
         double sum = 0;
         for (const double v : values) sum += v;
         return sum / static_cast<double>(values.size());
+    }
+    // What each level of the ellipsoids decides, and how wide the band is there.
+    void print_levels(const std::vector<Placed>& poses) {
+        const TreeView tree = covers_[0]->tree.view();
+        fmt::print("         levels, decided and band %:");
+        for (uint32_t level = 0; level < tree.level_count(); ++level) {
+            double decided = 0, width = 0;
+            for (const Placed& p : poses) {
+                decided +=
+                    collide_solids(tree, p.a, tree, p.b, *context_, {.max_level = level}).verdict != Verdict::undecided;
+                const SolidsDistance d =
+                    distance_solids(tree, p.a, tree, p.b, *context_, {.tolerance_relative = 1e-3, .max_level = level});
+                width += d.upper - d.lower;
+            }
+            const auto count = static_cast<double>(poses.size());
+            fmt::print(" {:.3f} {:.2f}{}", decided / count, 100 * width / exact_->diagonal / count,
+                       level + 1 < tree.level_count() ? "," : "\n");
+        }
     }
     // Microseconds of one call: the better of two rounds.
     template <class Query> double time(const Query& query) {

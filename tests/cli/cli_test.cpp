@@ -342,6 +342,32 @@ TEST_F(Cli, AFilledTreeSaysSoAndIsVerified) {
 
 // ---- writing ----
 
+TEST_F(Cli, AnInnerCoverThroughEveryCommand) {
+    const std::string mesh = file("peanut.obj", obj_text(peanut(8))), tree = file("a.etree");
+    const Outcome baked = run({"bake", mesh, "-o", tree, "--ellipsoids", "4", "--quality", "fast", "--inner", "6"});
+    ASSERT_EQ(baked.code, 0) << baked.err;
+    EXPECT_NE(baked.out.find("  inside    6 ellipsoids"), std::string::npos) << baked.out;
+    const Json info = Json::parse(run({"info", tree, "--json"}).out);
+    EXPECT_EQ(info["format_version"], 9);
+    EXPECT_EQ(info["inner"]["ellipsoids"], 6);
+    EXPECT_GT(info["inner"]["share_of_solid"], 0.6);
+    EXPECT_TRUE(info["unknown_sections"].empty());
+    EXPECT_NE(run({"info", tree}).out.find("% of the solid; proved"), std::string::npos);
+    EXPECT_NE(run({"verify", tree, mesh}).out.find("inner cover: inside the solid, proved"), std::string::npos);
+
+    Mesh moved = peanut(8);
+    for (Vec3& v : moved.vertices) v.x += 0.05f;
+    const Outcome no = run({"verify", tree, file("moved.obj", obj_text(moved)), "--json"});
+    EXPECT_EQ(no.code, 1);
+    EXPECT_FALSE(Json::parse(no.out)["inner_inside"]);
+
+    moved.triangles.pop_back(); // open
+    const Outcome open = run({"bake", file("open.obj", obj_text(moved)), "-o", file("b.etree"), "--inner", "6"});
+    EXPECT_EQ(open.code, 3);
+    EXPECT_NE(open.err.find("an open mesh has no inside for an inner cover"), std::string::npos) << open.err;
+    EXPECT_FALSE(fs::exists(file("b.etree")));
+}
+
 TEST_F(Cli, AMissingFolderIsFoundBeforeTheWork) {
     const std::string out = file("nowhere/out.etree");
     expect_failure(run({"bake", file("missing.obj"), "-o", out}), 4, out, "does not exist");
