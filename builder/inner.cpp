@@ -72,7 +72,7 @@ public:
             for (const Members& group : groups) {
                 format::PackedNode& node = nodes.emplace_back(leaves_[largest(group)]);
                 if (group.size() == 1) continue;
-                std::vector<Members> parts = halved(group, std::min<size_t>(group.size(), degree_));
+                std::vector<Members> parts = halved(group, children_of(group.size()));
                 node.child_count = static_cast<uint8_t>(parts.size());
                 std::move(parts.begin(), parts.end(), std::back_inserter(below));
             }
@@ -84,6 +84,12 @@ public:
 private:
     using Members = std::vector<uint32_t>; // leaves
 
+    // As few children as leave the tree as low as can be: full families waste no room in their blocks.
+    size_t children_of(size_t leaves) const {
+        size_t below = 1; // leaves that a child can have
+        while (below * degree_ < leaves) below *= degree_;
+        return (leaves + below - 1) / below;
+    }
     uint32_t largest(const Members& group) const {
         return *std::max_element(group.begin(), group.end(),
                                  [this](uint32_t a, uint32_t b) { return fits_[a].volume() < fits_[b].volume(); });
