@@ -98,6 +98,7 @@ const Hills::Known* Hills::known(uint32_t vertex) const {
     bool fits = true;
     find(vertex, [&](const Triangle& corners) {
         fits = fits && known.triangle_count < Known::kMost;
+        if (!fits) return;
         size_t other = 0;
         for (const uint32_t v : corners) {
             if (v == vertex || other == 2) continue;
