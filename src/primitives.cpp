@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -222,13 +223,16 @@ Result<Tree> box_tree(const Vec3& half) {
                                          {1, 7, 5}});
 }
 
-Result<Tree> cylinder_tree(float radius, float half_height) {
+Result<Tree> cylinder_tree(float radius, float half_height, uint32_t sides) {
     if (!is_length(radius) || !is_length(half_height)) return bad_size();
+    if (!std::has_single_bit(sides) || sides < 8 || sides > 1024)
+        return Error{ErrorCode::bad_options, "the sides of a cylinder's prism must be a power of two, 8 to 1024",
+                     sides};
     // Unit vectors around a circle, by halving angles: square roots are the same on all machines, sines are not.
     using Direction = std::array<double, 2>;
     std::vector<Direction> around{{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
     double halved = 0; // the length of the sum of two neighbours, halved: the cosine of half the angle between them
-    while (around.size() <= 32) {
+    while (around.size() <= sides) {
         std::vector<Direction> finer;
         for (size_t i = 0; i < around.size(); ++i) {
             const Direction &a = around[i], &b = around[(i + 1) % around.size()];
@@ -236,10 +240,9 @@ Result<Tree> cylinder_tree(float radius, float half_height) {
             halved = std::sqrt(m[0] * m[0] + m[1] * m[1]);
             finer.insert(finer.end(), {a, {m[0] / halved, m[1] / halved}});
         }
-        if (around.size() == 32) break;
+        if (around.size() == sides) break;
         around = std::move(finer);
     }
-    const auto sides = static_cast<uint32_t>(around.size());
     const double reach = double{radius} / halved * (1 + 0x1p-22); // corners round to floats by less
     std::vector<Vec3> vertices;
     for (const float z : {-half_height, half_height})

@@ -267,7 +267,7 @@ const Tree* simple_tree(const mjModel* m, int geom) {
     };
     if (fresh && type == mjGEOM_SPHERE) take(prolate::capsule_tree({}, {}, size.x));
     if (fresh && type == mjGEOM_CAPSULE) take(prolate::capsule_tree({0, 0, -size.y}, {0, 0, size.y}, size.x));
-    if (fresh && type == mjGEOM_CYLINDER) take(prolate::cylinder_tree(size.x, size.y));
+    if (fresh && type == mjGEOM_CYLINDER) take(prolate::cylinder_tree(size.x, size.y, 128));
     if (fresh && type == mjGEOM_BOX) take(prolate::box_tree(size));
     if (fresh && type == mjGEOM_ELLIPSOID)
         take(prolate::ellipsoid_tree({.center = {}, .l11 = size.x, .l22 = size.y, .l33 = size.z}));

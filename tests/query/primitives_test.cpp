@@ -16,6 +16,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <utility>
 #include <vector>
 
 namespace prolate {
@@ -139,9 +140,11 @@ TEST(Primitives, ABoxRestsOnAFloor) {
 
 TEST(Primitives, ACylinderIsHeldAndLittleMore) {
     Random random(4);
-    for (const float radius : {1.0f, 0.01f, 250.0f}) {
+    for (const auto& [radius, sides] : {std::pair(1.0f, 32u), {0.01f, 8u}, {250.0f, 256u}}) {
         const float half = 2 * radius;
-        const Tree tree = must(cylinder_tree(radius, half));
+        const double more = 5.3 / (sides * sides); // of the radius
+        const Tree tree = must(sides == 32 ? cylinder_tree(radius, half) : cylinder_tree(radius, half, sides));
+        EXPECT_EQ(tree.view().triangle_count(), 4 * sides - 4);
         const auto context = std::make_unique<QueryContext>();
         for (int i = 0; i < 500; ++i) {
             const double x = random.in(-1, 1), y = random.in(-1, 1), length = std::hypot(x, y);
@@ -153,11 +156,13 @@ TEST(Primitives, ACylinderIsHeldAndLittleMore) {
             const double z = random.in(-1, 1) * double{half};
             const SignedDistance on = signed_distance(tree.view(), {}, at(double{radius}, z), *context);
             EXPECT_LE(on.lower, 1e-7 * double{radius});
-            EXPECT_GE(on.upper, -0.005 * double{radius});
+            EXPECT_GE(on.upper, -more * double{radius});
             EXPECT_EQ(contains(tree.view(), {}, at(0.999 * double{radius}, z), *context), Verdict::overlapping);
-            EXPECT_EQ(contains(tree.view(), {}, at(1.006 * double{radius}, z), *context), Verdict::separated);
+            EXPECT_EQ(contains(tree.view(), {}, at((1 + 1.1 * more) * double{radius}, z), *context),
+                      Verdict::separated);
         }
     }
+    for (const uint32_t sides : {0u, 4u, 33u, 2048u}) EXPECT_EQ(cylinder_tree(1, 1, sides).error().where, sides);
 }
 
 TEST(Primitives, AnEllipsoidIsHeldAndLittleMore) {
