@@ -45,7 +45,6 @@ SINGLE: tuple[Kind, ...] = ("box", "capsule", "cylinder", "sphere")
 KINDS: tuple[Kind, ...] = ("hull", *SINGLE, "ellipsoids", "spheres")
 WORTH = 0.01  #: part of a cover's volume that is worth no more of a cost
 FURTHER = 0.05  #: part of a link's volume that a further hull must gain, as each costs time wherever the robot is
-CONVEX = 1e-6  #: part of its hull's volume that a convex mesh may lack, by rounding
 NEGLIGIBLE = 0.005  #: part of a cover's volume that is not worth a bake
 COUNTS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  #: of convex pieces that are tried
 VERTICES_OF_ONE = 256  #: of a hull that costs as much as one ellipsoid
@@ -164,7 +163,7 @@ class Solid:
         if not self.has_hulls:
             return None
         hull = volume_of_hull(self.points)
-        if hull - self.volume <= CONVEX * hull:
+        if hull - self.volume <= NEGLIGIBLE * hull:
             return None
         return Pieces(self.vertices, self.faces, self.exact, self.options.threads)
 
