@@ -2,6 +2,7 @@
 
 #include "builder/central.hpp"
 #include "builder/divide.hpp"
+#include "builder/exchange.hpp"
 #include "builder/job.hpp"
 #include "builder/random.hpp"
 
@@ -27,11 +28,13 @@ constexpr double kShapeScale = 0.35;
 // Of thin ones, and of surfaces that enclose nothing: in sides of a square that has its share of the area.
 constexpr double kThinShapeScale = 0.1;
 constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
+constexpr double kPull = 20, kPullIterations = 500; // of longer descents of many, uncovered points pull less
 constexpr int kPolishDirections = 256;
 // A set whose ellipsoids start below those of the set above may have so much more error than one that starts alone.
 constexpr double kMostLoss = 1.15;
-constexpr double kReheat = 10;      // kappa at the start of a cycle
-constexpr double kLeastWorth = 0.5; // of a further ellipsoid, in means of those that are there
+constexpr int kLeastIterations = 75; // that tell anything
+constexpr double kReheat = 10;       // kappa at the start of a cycle
+constexpr double kLeastWorth = 0.5;  // of a further ellipsoid, in means of those that are there
 
 } // namespace
 
@@ -89,7 +92,7 @@ FlatSet FlatSetMaker::make(uint32_t count, const FlatSet* above, const std::func
         }
     };
     const bool twice = effort_.middle.starts > 0 && count > kFew && count <= kMergeLimit;
-    look(effort_.search, 0, twice ? 0.3 : 1);
+    look(count > kMergeLimit ? effort_.many : effort_.search, 0, twice ? 0.3 : 1);
     if (twice) look(effort_.middle, 0.3, 1);
     return best;
 }
@@ -99,25 +102,60 @@ std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const Searc
                                                      const std::function<void(double)>& progress) const {
     int starts = search.starts * std::clamp(static_cast<int>(kManyStarts / count), 1, kMostStarts);
     if (above && above->parts.size() == 1) above = nullptr;
-    if (above) starts = std::max(starts, 2); // the last one knows of no set above
-    const int rounds = starts + search.cycles;
+    int iterations = search.iterations;
     const std::vector<Vec> points = points_for(count);
+    if (above && count > kMergeLimit && starts == 1) {
+        if (better_alone(count, *above, points, iterations)) above = nullptr;
+        iterations = iterations * 3 / 4; // as many in all
+    } else if (above)
+        starts = std::max(starts, 2); // the last one knows of no set above
+    const int exchanges = count <= kFew ? search.exchanges : 0, rounds = starts + search.cycles + exchanges;
     std::vector<Start> best; // best first
     std::vector<double> least;
-    for (int round = 0; round < rounds; ++round) {
-        const bool fresh = round < starts, alone = round == starts - 1;
-        Start now = fresh ? start(count, alone ? nullptr : above, round, points) : best.front();
-        descend_from(now, points, fresh ? search.iterations : search.iterations / 2, fresh ? 1 : kReheat, round,
-                     [&](double done) { progress(0.9 * (round + done) / rounds); });
+    const auto attempt = [&](Start now, int round, int length, double kappa) {
+        descend_from(now, points, length, kappa, round, [&](double done) { progress(0.9 * (round + done) / rounds); });
         double error = approximate_error(now.fits);
         if (above && now.family.empty()) error *= kMostLoss;
         const auto place = std::ranges::upper_bound(least, error) - least.begin();
         best.insert(best.begin() + place, std::move(now)), least.insert(least.begin() + place, error);
         if (best.size() > static_cast<size_t>(search.finalists)) best.pop_back(), least.pop_back();
+        return place == 0;
+    };
+    int round = 0;
+    for (; round < starts; ++round)
+        attempt(start(count, starts > 1 && round == starts - 1 ? nullptr : above, round, points), round, iterations, 1);
+    for (; round < starts + search.cycles; ++round) attempt(best.front(), round, iterations / 2, kReheat);
+    std::vector<std::vector<Fit>> near;
+    for (bool better = true; round < rounds; ++round) {
+        if (better) near = next_to(best.front().fits, static_cast<size_t>(rounds - round));
+        if (near.empty()) break;
+        better = attempt(start_at(std::move(near.front()), points), round, iterations / 2, kReheat);
+        near.erase(near.begin());
     }
     std::vector<std::vector<Fit>> out;
     out.reserve(best.size());
     for (Start& one : best) out.push_back(std::move(one.fits));
+    return out;
+}
+
+// Is a set much tighter if it knows of none above? By short descents.
+bool FlatSetMaker::better_alone(uint32_t count, const FlatSet& above, std::span<const Vec> points,
+                                int iterations) const {
+    const auto error = [&](const FlatSet* known) {
+        Start one = start(count, known, 0, points);
+        descend_from(one, points, std::max(iterations / 8, kLeastIterations), 1, 0, {});
+        return approximate_error(one.fits);
+    };
+    return kMostLoss * error(nullptr) < error(&above);
+}
+
+// Where one ellipsoid less in one place and one more in another may be tighter.
+std::vector<std::vector<Fit>> FlatSetMaker::next_to(std::span<const Fit> fits, size_t most) const {
+    auto out = exchanges(
+        fits, share_cells(fits), solid_.cells, min_radius_, [this](const Fit& fit) { return outside_volume(fit); },
+        most);
+    for (std::vector<Fit>& set : out)
+        for (Fit& fit : set) fit = as_primitive(fit, options_.primitive);
     return out;
 }
 
@@ -131,47 +169,82 @@ FlatSet FlatSetMaker::settle(std::vector<Fit> fits, size_t count, const Search& 
     std::erase_if(set.parts, [](const Part& part) { return part.pieces.empty(); });
     set.outside = outside_of(fits_of(set.parts));
     // Places of those that were redundant go to halves, where one more is worth about as much as the others.
-    FlatSet fuller = set;
-    halve(fuller.parts, count, kLeastWorth * set.outside / static_cast<double>(set.parts.size()));
-    if (fuller.parts.size() == set.parts.size()) return set;
-    fuller.outside = outside_of(fits_of(fuller.parts));
-    return fuller.outside < set.outside ? fuller : set;
+    halve(set, count, kLeastWorth * set.outside / static_cast<double>(set.parts.size()));
+    return set;
 }
 
 void FlatSetMaker::split(FlatSet& set, size_t count) const {
     if (set.parts.size() >= count) return;
-    halve(set.parts, count, -HUGE_VAL);
+    halve(set, count, 0);
+    // Nothing is gained any more: as many as were asked for, but none that sticks out where its whole did not.
+    while (set.parts.size() < count) {
+        Part& most = *std::ranges::max_element(set.parts, {}, [](const Part& part) { return part.pieces.size(); });
+        if (most.pieces.size() < 2) return;
+        auto [a, b] = halves_of(most);
+        Part rest{smaller(most.fit, b), std::move(b)};
+        most = {smaller(most.fit, a), std::move(a)};
+        set.parts.push_back(std::move(rest));
+    }
     set.outside = outside_of(fits_of(set.parts));
 }
 
-// Halves the part that sticks out most, and then the next, until there are `count`: only such as then stick out by at
-// least `worth` cubic metres less.
-void FlatSetMaker::halve(std::vector<Part>& parts, size_t count, double worth) const {
-    if (parts.size() >= count) return;
-    std::vector<double> outside;
-    const auto look = [&](const Part& part) { return part.pieces.size() > 1 ? outside_volume(part.fit) : -1; };
-    outside.reserve(parts.size());
-    for (const Part& part : parts) outside.push_back(look(part));
+// Halves the part that alone sticks out most, and then the next, until there are `count`: only such as then stick out
+// by at least `worth` cubic metres less, by a rough measure. If the set does not, by a finer one, it is left as it is.
+void FlatSetMaker::halve(FlatSet& set, size_t count, double worth) const {
+    FlatSet halved = set;
+    std::vector<Part>& parts = halved.parts;
+    std::vector<std::vector<uint32_t>> neighbours = neighbours_of(fits_of(parts), 1);
+    const auto alone = [&](const Fit& fit, size_t i) {
+        std::vector<const Fit*> others;
+        for (const uint32_t j : neighbours[i]) others.push_back(&parts[j].fit);
+        return sampled_outside_volume(fit, solid_.field, others);
+    };
+    std::vector<double> outside(parts.size());
+    parallel_for(size_t{0}, parts.size(), [&](size_t i) { outside[i] = alone(parts[i].fit, i); });
     while (parts.size() < count) {
         const auto most = static_cast<size_t>(std::ranges::max_element(outside) - outside.begin());
-        if (outside.empty() || outside[most] < 0) return;
-        const Part whole = parts[most];
-        const auto [a, b] = divide(whole.pieces, whole.pieces.size() / 2,
-                                   [this](uint32_t piece) { return solid_.pieces.center(piece); });
-        Part low{part_of(whole.fit, a), a}, high{part_of(whole.fit, b), b};
-        if (outside_volume(low.fit) + outside_volume(high.fit) + worth > outside[most]) {
+        if (outside.empty() || outside[most] < 0) break;
+        if (parts[most].pieces.size() < 2) {
             outside[most] = -1;
             continue;
         }
-        outside[most] = look(low), outside.push_back(look(high));
+        auto [a, b] = halves_of(parts[most]);
+        const auto measure = [&](const Fit& fit) { return alone(fit, most); };
+        Part low{part_of(parts[most].fit, a, measure), std::move(a)};
+        Part high{part_of(parts[most].fit, b, measure), std::move(b)};
+        const double first = measure(low.fit), second = measure(high.fit);
+        if (first + second + worth >= outside[most]) {
+            outside[most] = -1;
+            continue;
+        }
+        const auto next = static_cast<uint32_t>(parts.size());
+        outside[most] = first, outside.push_back(second);
         parts[most] = std::move(low), parts.push_back(std::move(high));
+        neighbours.push_back(neighbours[most]);
+        for (const uint32_t j : neighbours[most]) neighbours[j].push_back(next);
+        neighbours[most].push_back(next), neighbours[next].push_back(static_cast<uint32_t>(most));
     }
+    if (parts.size() == set.parts.size()) return;
+    halved.outside = outside_of(fits_of(parts));
+    if (halved.outside < set.outside) set = std::move(halved);
+}
+
+// The part's pieces, in two.
+std::pair<std::vector<uint32_t>, std::vector<uint32_t>> FlatSetMaker::halves_of(const Part& part) const {
+    return divide(part.pieces, part.pieces.size() / 2, [this](uint32_t piece) { return solid_.pieces.center(piece); });
+}
+
+// `whole`, as small as these of the pieces that it holds let it be.
+Fit FlatSetMaker::smaller(const Fit& whole, std::span<const uint32_t> pieces) const {
+    const Fit fit = whole.scaled(reach_of(whole, solid_.pieces, pieces));
+    return within_caps(fit, min_radius_) ? fit : whole;
 }
 
 // For some of the pieces that `whole` holds: a fit of their own, or, if that sticks out more, a smaller `whole`.
-Fit FlatSetMaker::part_of(const Fit& whole, std::span<const uint32_t> pieces) const {
-    const Fit smaller = whole.scaled(reach_of(whole, solid_.pieces, pieces)), own = fit_around(pieces);
-    return within_caps(smaller, min_radius_) && outside_volume(smaller) < outside_volume(own) ? smaller : own;
+Fit FlatSetMaker::part_of(const Fit& whole, std::span<const uint32_t> pieces,
+                          const std::function<double(const Fit&)>& outside) const {
+    const Fit less = smaller(whole, pieces), own = fit_around(pieces);
+    return outside(less) < outside(own) ? less : own;
 }
 
 Fit FlatSetMaker::fit_around(std::span<const uint32_t> pieces) const {
@@ -199,7 +272,7 @@ FlatSetMaker::Start FlatSetMaker::start(uint32_t count, const FlatSet* above, in
     const bool merging = count <= kMergeLimit && (number % 2 == 0) == (count <= kFew);
     const uint32_t blocks = kPiecesPerCluster[static_cast<size_t>(number) / 2 % std::size(kPiecesPerCluster)];
     const auto seed = options_.seed + static_cast<uint64_t>(number);
-    const std::vector<std::vector<uint32_t>> shares = share_cells(above);
+    const std::vector<std::vector<uint32_t>> shares = share_cells(above ? fits_of(above->parts) : std::vector<Fit>(1));
     std::vector<std::vector<Cluster>> clusters(shares.size());
     parallel_for(size_t{0}, shares.size(), [&](size_t s) {
         const auto k = static_cast<uint32_t>(count * (s + 1) / shares.size() - count * s / shares.size());
@@ -222,9 +295,17 @@ FlatSetMaker::Start FlatSetMaker::start(uint32_t count, const FlatSet* above, in
     return out;
 }
 
-// The cells, each to the part of `above` that has it most centrally.
-std::vector<std::vector<uint32_t>> FlatSetMaker::share_cells(const FlatSet* above) const {
-    const std::vector<Fit> fits = above ? fits_of(above->parts) : std::vector<Fit>(1);
+// Of ellipsoids that know of no set above.
+FlatSetMaker::Start FlatSetMaker::start_at(std::vector<Fit> fits, std::span<const Vec> points) const {
+    Start out{std::move(fits), {}, {}};
+    const CentralTree tree(out.fits);
+    out.owner.reserve(points.size());
+    for (const Vec& p : points) out.owner.push_back(tree.find(p, HUGE_VAL).value_or(0));
+    return out;
+}
+
+// The cells, each to the one of `fits` that has it most centrally.
+std::vector<std::vector<uint32_t>> FlatSetMaker::share_cells(std::span<const Fit> fits) const {
     const CentralTree tree(fits);
     std::vector<std::vector<uint32_t>> out(fits.size());
     for (uint32_t cell = 0; cell < solid_.cells.cell_count(); ++cell)
@@ -258,6 +339,8 @@ void FlatSetMaker::descend_from(Start& start, std::span<const Vec> points, int i
                                  .min_radius = min_radius_,
                                  .relocate = count > kFew,
                                  .first_kappa = kappa,
+                                 .pull =
+                                     count > kMergeLimit ? kPull * std::min(1.0, kPullIterations / iterations) : kPull,
                                  .seed = Random(options_.seed + static_cast<uint64_t>(number)).bits(),
                                  .family = start.family,
                                  .progress = progress};

@@ -13,6 +13,7 @@
 #include <prolate/build.hpp>
 
 #include <functional>
+#include <utility>
 #include <vector>
 
 namespace prolate {
@@ -84,15 +85,21 @@ private:
     };
     std::vector<std::vector<Fit>> approach(uint32_t count, const Search& search, const FlatSet* above,
                                            const std::function<void(double)>& progress) const;
+    bool better_alone(uint32_t count, const FlatSet& above, std::span<const Vec> points, int iterations) const;
+    std::vector<std::vector<Fit>> next_to(std::span<const Fit> fits, size_t most) const;
     FlatSet settle(std::vector<Fit> fits, size_t count, const Search& search);
     Start start(uint32_t count, const FlatSet* above, int number, std::span<const Vec> points) const;
+    Start start_at(std::vector<Fit> fits, std::span<const Vec> points) const;
     void descend_from(Start& start, std::span<const Vec> points, int iterations, double kappa, int number,
                       const std::function<void(double)>& progress) const;
-    std::vector<std::vector<uint32_t>> share_cells(const FlatSet* above) const;
+    std::vector<std::vector<uint32_t>> share_cells(std::span<const Fit> fits) const;
     std::vector<Vec> points_for(uint32_t count) const;
     std::vector<uint32_t> polish_set(std::vector<Fit>& fits, const Search& search) const;
-    void halve(std::vector<Part>& parts, size_t count, double worth) const;
-    Fit part_of(const Fit& whole, std::span<const uint32_t> pieces) const;
+    void halve(FlatSet& set, size_t count, double worth) const;
+    std::pair<std::vector<uint32_t>, std::vector<uint32_t>> halves_of(const Part& part) const;
+    Fit smaller(const Fit& whole, std::span<const uint32_t> pieces) const;
+    Fit part_of(const Fit& whole, std::span<const uint32_t> pieces,
+                const std::function<double(const Fit&)>& outside) const;
     CoverVolume measure(std::span<const Fit> fits) const;
     double approximate_error(std::span<const Fit> fits) const;
     Objective objective(size_t count) const;

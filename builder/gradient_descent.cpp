@@ -21,7 +21,6 @@ namespace {
 
 constexpr double kLastKappa = 18;
 constexpr double kFirstStep = 0.07, kStepDecay = 0.75;  // relative to the radii; falls to 0.4 % of the first
-constexpr double kPull = 20;                            // growth of the multipliers, times ellipsoids / points
 constexpr double kEarlyPull = 2, kAccumulateFrom = 0.3; // until then a penalty on the excess alone, with kappa
 constexpr double kMaxExcess = 0.3;                      // radial coordinates beyond 1 count no more than this
 constexpr int kNeighbourInterval = 8;                   // iterations between two searches for neighbours
@@ -137,7 +136,7 @@ private:
 
     // Who covers each point, how hard those that nobody covers pull, and on whom.
     void update_points(size_t iteration, bool accumulating) {
-        const double rate = (accumulating ? kPull : kEarlyPull * kappa_) * static_cast<double>(fits_.size()) /
+        const double rate = (accumulating ? options_.pull : kEarlyPull * kappa_) * static_cast<double>(fits_.size()) /
                             static_cast<double>(std::max<size_t>(1, points_.size()));
         tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
             for (size_t p = range.begin(); p != range.end(); ++p) {

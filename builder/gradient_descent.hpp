@@ -48,6 +48,7 @@ struct DescentOptions {
     double min_radius;  ///< metres
     bool relocate;      ///< let ellipsoids that are of little use help where the error is worst
     double first_kappa; ///< 1 for a start from scratch; more to stay near the start
+    double pull = 20;   ///< how fast the multipliers of uncovered points grow, times ellipsoids / points
     uint64_t seed;
     /// Empty, or a number for each ellipsoid: one helps only such as have the same.
     std::span<const uint32_t> family = {};

@@ -255,7 +255,7 @@ Fit fit_of(std::span<const Vec> sites, std::span<const uint32_t> members, double
 
 } // namespace
 
-double sampled_outside_volume(const Fit& fit, const DistanceField& field) {
+double sampled_outside_volume(const Fit& fit, const DistanceField& field, std::span<const Fit* const> others) {
     static const std::vector<Vec> samples = [] { // evenly spread in the unit ball
         std::vector<Vec> out = even_directions(kVolumeSamples);
         for (int i = 0; i < kVolumeSamples; ++i) // 119 is prime to 192: the radii are spread over the directions
@@ -263,8 +263,11 @@ double sampled_outside_volume(const Fit& fit, const DistanceField& field) {
         return out;
     }();
     double outside = 0;
-    for (const Vec& u : samples)
-        outside += std::clamp(field(fit.center + fit.factor * u) / field.pitch() + 0.5, 0.0, 1.0);
+    for (const Vec& u : samples) {
+        const Vec x = fit.center + fit.factor * u;
+        if (std::ranges::any_of(others, [&](const Fit* other) { return other->radial_squared(x) < 1; })) continue;
+        outside += std::clamp(field(x) / field.pitch() + 0.5, 0.0, 1.0);
+    }
     return fit.volume() * outside / static_cast<double>(samples.size());
 }
 

@@ -35,8 +35,8 @@ std::vector<std::vector<uint32_t>> merge_groups(std::span<const Sketch> sketches
                                                 size_t most, double min_radius,
                                                 const std::function<double(const Fit&)>& outside);
 
-/// E_vol of the ellipsoid (paper, eq. 2), by sampling its inside.
-double sampled_outside_volume(const Fit& fit, const DistanceField& field);
+/// E_vol of the ellipsoid (paper, eq. 2), by sampling its inside: without what `others` hold, too.
+double sampled_outside_volume(const Fit& fit, const DistanceField& field, std::span<const Fit* const> others = {});
 
 /// k cells far from each other, then Lloyd's algorithm. Spreads evenly; good for many ellipsoids.
 std::vector<Cluster> spread_start(const Voxels& voxels, std::span<const uint32_t> cells, uint32_t k, uint64_t seed,

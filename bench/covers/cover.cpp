@@ -12,8 +12,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
@@ -77,6 +79,11 @@ private:
                                           {"hausdorff_mean", "mean", "{:.3f}", 6},
                                           {"hausdorff_p99", "99 %", "{:.2f}", 6},
                                           {"sum_of_volumes", "volumes", "{:.2f}", 8},
+                                          {"list_bytes", "bytes", "{:.0f}", 7},
+                                          {"nanoseconds", "ns", "{:.0f}", 6},
+                                          {"outside_at_count", "at n", "{:.2f}", 7},
+                                          {"outside_at_bytes", "at B", "{:.2f}", 7},
+                                          {"outside_at_time", "at ns", "{:.2f}", 7},
                                           {"proved", "proved", "{}", 7},
                                           {"cpu_seconds", "cpu s", "{:.2f}", 8},
                                           {"wall_seconds", "wall s", "{:.2f}", 8},
@@ -143,6 +150,11 @@ private:
                                             "hausdorff_mean",
                                             "hausdorff_p99",
                                             "sum_of_volumes",
+                                            "list_bytes",
+                                            "nanoseconds",
+                                            "outside_at_count",
+                                            "outside_at_bytes",
+                                            "outside_at_time",
                                             "proved",
                                             "goal_reached",
                                             "cpu_seconds",
@@ -168,6 +180,7 @@ void put(Json& row, const Figures& f) {
     row["outside_ratio"] = f.outside_ratio, row["outside_error"] = f.outside_error, row["uncovered"] = f.uncovered;
     row["hausdorff_max"] = f.hausdorff_max, row["hausdorff_mean"] = f.hausdorff_mean;
     row["hausdorff_p99"] = f.hausdorff_p99, row["sum_of_volumes"] = f.sum_of_volumes;
+    row["list_bytes"] = f.list_bytes, row["nanoseconds"] = f.nanoseconds;
 }
 
 void put(Json& row, const Cost& c) {
@@ -183,6 +196,45 @@ void put_published(Json& row, const std::string& model, uint32_t triangles, uint
 // What a row is set against: its outside ratio and CPU seconds over those.
 struct Reference {
     double outside = kUnknown, cpu = kUnknown;
+};
+
+// How the outside ratio of some covers falls with what they cost.
+class Curve {
+public:
+    void add(double cost, double outside) {
+        if (cost > 0 && outside > 0) points_[std::log(cost)] = std::log(outside);
+    }
+    // Of the cover of that cost, between two that are there (on a straight line of logarithms); else unknown.
+    double operator()(double cost) const {
+        const auto above = points_.lower_bound(std::log(cost));
+        if (above == points_.end()) return kUnknown;
+        if (above->first == std::log(cost)) return std::exp(above->second);
+        if (above == points_.begin()) return kUnknown;
+        const auto below = std::prev(above);
+        const double t = (std::log(cost) - below->first) / (above->first - below->first);
+        return std::exp(std::lerp(below->second, above->second, t));
+    }
+
+private:
+    std::map<double, double> points_;
+};
+
+// What rows of other primitives are set against: ellipsoids as many, as large or as fast.
+struct Curves {
+    Curve by_count, by_bytes, by_time;
+
+    void add(const Json& row) {
+        const double outside = row["outside_ratio"];
+        by_count.add(row["count"], outside);
+        by_bytes.add(row["list_bytes"], outside);
+        by_time.add(row["nanoseconds"], outside);
+    }
+    void compare(Json& row) const {
+        const double outside = row["outside_ratio"];
+        row["outside_at_count"] = outside / by_count(row["count"]);
+        row["outside_at_bytes"] = outside / by_bytes(row["list_bytes"]);
+        row["outside_at_time"] = outside / by_time(row["nanoseconds"]);
+    }
 };
 
 std::string stem(const std::string& path) {
@@ -248,25 +300,31 @@ public:
 
 private:
     Json bake(const std::string& path, BuildOptions options, uint32_t count, const std::string& made_of,
-              const Reference& reference = {}) {
+              const Reference& reference = {}, Curves* curves = nullptr) {
         options.ellipsoids = count;
         const Baked baked = bake_apart(path, options, a_.columns, false);
         const uint32_t last = baked.level_count ? baked.level_count - 1 : 0;
-        const Json row = row_of(path, made_of, options, baked, last, count, reference);
+        Json row = row_of(path, made_of, options, baked, last, count, reference);
         failed_ |= row.contains("error") && !baked.unsupported;
+        if (curves && !row.contains("error")) {
+            if (options.primitive == Primitive::ellipsoid) curves->add(row);
+            curves->compare(row);
+        }
         report_.add(row);
         return row;
     }
 
     void flat(const std::string& path) {
         report_.title(fmt::format("{}: flat sets, quality {}", path, a_.quality));
-        for (const uint32_t count : a_.counts)
-            for (const std::string& primitive : a_.primitives) {
+        Curves ellipsoids; // first, so that the others can be set against them
+        for (const auto& [name, primitive] : kPrimitives)
+            for (const uint32_t count : a_.counts) {
+                if (std::ranges::find(a_.primitives, name) == a_.primitives.end()) continue;
                 BuildOptions options = base_;
-                options.primitive = kPrimitives.at(primitive);
-                bake(path, options, count, primitive + 's');
+                options.primitive = primitive;
+                bake(path, options, count, name + 's', {}, &ellipsoids);
             }
-        peers(path);
+        peers(path, ellipsoids);
     }
 
     // Each level of a tree against the flat set of the same count.
@@ -321,7 +379,7 @@ private:
         }
     }
 
-    void peers(const std::string& path) {
+    void peers(const std::string& path, const Curves& ellipsoids) {
         if (a_.peers.empty()) return;
         const Decomposers decomposers(a_.peers);
         std::string why;
@@ -330,11 +388,11 @@ private:
         const auto model = load_model(path);
         if (!model) return;
         for (const std::string& name : names)
-            for (const uint32_t count : a_.counts) peer(path, *model, decomposers, name, count);
+            for (const uint32_t count : a_.counts) peer(path, *model, decomposers, name, count, ellipsoids);
     }
 
     void peer(const std::string& path, const Model& model, const Decomposers& decomposers, const std::string& name,
-              uint32_t count) {
+              uint32_t count, const Curves& ellipsoids) {
         const auto made = decomposers.run(name, model.mesh.view(), count, a_.peer_seconds);
         if (!made) return report_.note(fmt::format("{} {}: gave nothing within {} s", name, count, a_.peer_seconds));
         // In a child: oneTBB's threads must not be there when the next bake forks.
@@ -344,6 +402,7 @@ private:
                  {"closed", model.closed}, {"made_of", fmt::format("{} {} hulls", name, made->version)},
                  {"primitive", "hull"},    {"asked", count}};
         put(row, *figures);
+        ellipsoids.compare(row);
         row["proved"] = false;
         put(row, made->cost);
         put_published(row, stem(path), static_cast<uint32_t>(model.mesh.triangles.size()), count);

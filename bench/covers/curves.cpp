@@ -23,9 +23,6 @@
 namespace prolate::bench {
 namespace {
 
-// What a plain list takes: center and radius, center and factor, corners; four bytes a number.
-constexpr size_t kSphereBytes = 16, kEllipsoidBytes = 36, kCornerBytes = 12;
-
 constexpr const char* kPublishedHulls = "V-HACD hulls (published)";
 
 struct Arguments {

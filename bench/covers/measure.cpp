@@ -1,5 +1,7 @@
 #include "bench/covers/measure.hpp"
 
+#include "cli/compare/query_time.hpp"
+
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
@@ -106,6 +108,9 @@ Baked bake(const std::string& path, const BuildOptions& options, int columns_acr
         std::vector<Ellipsoid> cut;
         tree.for_each_in_cut(l, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
         Figures& figures = out.levels[l] = judge.ellipsoids(cut);
+        const size_t each = options.primitive == Primitive::sphere ? kSphereBytes : kEllipsoidBytes;
+        figures.list_bytes = static_cast<double>(each * cut.size());
+        if (!all_levels) figures.nanoseconds = cli::nanoseconds_a_query(tree);
         const LevelReport& own = built->levels[l]; // no lattice takes part in these
         figures.hausdorff_max = 100 * own.hausdorff_max / built->diagonal;
         figures.hausdorff_mean = 100 * own.hausdorff_mean / built->diagonal;
@@ -190,6 +195,9 @@ Figures Judge::hulls(MeshView hulls, uint32_t count) const {
     out.outside_ratio = (cover.volume().value - common) / volume_;
     out.uncovered = 1 - common / volume_;
     out.sum_of_volumes = enclosed_volume(hulls) / volume_;
+    out.list_bytes = static_cast<double>(kCornerBytes * hulls.vertices.size());
+    if (const auto exact = build(hulls, {.exact = true, .threads = 1}))
+        out.nanoseconds = cli::nanoseconds_a_query(exact->tree.view());
     return out;
 }
 

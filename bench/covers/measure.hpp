@@ -23,6 +23,10 @@ inline constexpr double kUnknown = LevelFigures::kUnknown;
 inline const std::map<std::string, Quality> kQualities{
     {"fast", Quality::fast}, {"normal", Quality::normal}, {"best", Quality::best}};
 
+/// What a plain list of primitives takes: center and radius, center and factor, and of a hull its corners; four bytes a
+/// number.
+inline constexpr size_t kSphereBytes = 16, kEllipsoidBytes = 36, kCornerBytes = 12;
+
 /// What a piece of work took. Peak memory is the process's: of the whole, loading included.
 struct Cost {
     double wall_seconds = 0, cpu_seconds = 0, megabytes = 0;
@@ -45,6 +49,8 @@ struct Figures {
     double uncovered = kUnknown;     ///< volume of (solid \ cover) / volume of the solid
     double hausdorff_max = kUnknown, hausdorff_mean = kUnknown, hausdorff_p99 = kUnknown;
     double sum_of_volumes = kUnknown; ///< of the primitives, each by itself / volume of the solid
+    double list_bytes = kUnknown;     ///< of a plain list of the primitives
+    double nanoseconds = kUnknown;    ///< that a query takes, see cli/compare/query_time.hpp
 };
 
 /// Measures volumes of covers of one solid, on columns of its own: a bake must not be judged on the lattice that it
@@ -54,7 +60,8 @@ public:
     Judge(const Model& model, int columns_across);
     Figures ellipsoids(std::span<const Ellipsoid> cover) const;
     /// `hulls` are `count` closed convex surfaces, oriented outwards, one after the other. hausdorff_max is sampled on
-    /// them, twice in each percent of the diagonal, so that it is too small by up to a third of a percent.
+    /// them, twice in each percent of the diagonal, so that it is too small by up to a third of a percent. Queries are
+    /// those of an exact tree of them all.
     Figures hulls(MeshView hulls, uint32_t count) const;
 
 private:
@@ -79,7 +86,8 @@ struct Baked {
 };
 
 /// Bakes the mesh of `path` in a process of its own, so that peak memory is its own, and judges each level's cut (only
-/// the last one if not `all_levels`; none if `columns_across` is 0). The caller must not have started threads.
+/// the last one, with a query's time, if not `all_levels`; none if `columns_across` is 0). The caller must not have
+/// started threads.
 Baked bake_apart(const std::string& path, const BuildOptions& options, int columns_across, bool all_levels);
 
 /// Runs `work` in a child process and returns what it returns; nothing if the child died. No threads may run yet.

@@ -1,36 +1,23 @@
 #include "cli/compare/choices.hpp"
 
 #include "cli/compare/hull.hpp"
+#include "cli/compare/query_time.hpp"
 #include "cli/render/solid.hpp"
-
-#include <prolate/collide.hpp>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
-#include <memory>
 #include <queue>
-#include <random>
 
 namespace prolate::cli {
 namespace {
 
 constexpr uint32_t kCounts[] = {8, 16, 32, 64};
 constexpr uint32_t kSpheres = 64;
-constexpr int kPoses = 64, kRepetitions = 200;
-constexpr double kNear = 0.01;         // of a body's size: how far apart the two are
 constexpr double kFineEnough = 0.001;  // of the diagonal: of a hull's clearance
 constexpr size_t kMostParts = 100'000; // of its surface, to look at
-
-Quat random_rotation(std::mt19937& random) {
-    std::normal_distribution<float> normal;
-    Quat q{normal(random), normal(random), normal(random), normal(random)};
-    const float length = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
-    return {q.x / length, q.y / length, q.z / length, q.w / length};
-}
 
 // A part of a hull's surface.
 struct Part {
@@ -82,41 +69,6 @@ Outcome<std::vector<Choice>> hull_choice(const std::string& path, const CleanMes
 }
 
 } // namespace
-
-double nanoseconds_a_query(const TreeView& tree) {
-    using Clock = std::chrono::steady_clock;
-    std::mt19937 random(1); // the same poses for all
-    std::normal_distribution<float> normal;
-    const auto context = std::make_unique<QueryContext>();
-    const double size = tree.bake_info().diagonal;
-    std::vector<double> times;
-    for (int n = 0; n < kPoses; ++n) {
-        Pose a, b;
-        a.rotation = random_rotation(random), b.rotation = random_rotation(random);
-        float direction[3];
-        for (float& x : direction) x = normal(random);
-        const float length = std::hypot(direction[0], direction[1], direction[2]);
-        const auto place = [&](double t) {
-            const float by = static_cast<float>(t) / length;
-            b.translation = {by * direction[0], by * direction[1], by * direction[2]};
-        };
-        double low = 0, high = 4 * size;
-        for (int i = 0; i < 20; ++i) {
-            place(0.5 * (low + high));
-            const bool apart = collide(tree, a, tree, b, *context).verdict == Verdict::separated;
-            (apart ? high : low) = 0.5 * (low + high);
-        }
-        place(high + kNear * size);
-        uint64_t tests = 0; // so that no query is left out
-        const auto start = Clock::now();
-        for (int i = 0; i < kRepetitions; ++i) tests += collide(tree, a, tree, b, *context).stats.pair_tests;
-        const std::chrono::duration<double, std::nano> taken = Clock::now() - start;
-        if (tests > 0) times.push_back(taken.count() / kRepetitions);
-    }
-    if (times.empty()) return 0;
-    std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
-    return times[times.size() / 2];
-}
 
 Outcome<std::vector<Choice>> make_choices(const std::string& path, const CleanMesh& mesh, BuildOptions options,
                                           const std::function<bool(const std::string&, double)>& progress) {

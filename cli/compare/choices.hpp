@@ -26,8 +26,4 @@ struct Choice {
 Outcome<std::vector<Choice>> make_choices(const std::string& path, const CleanMesh& mesh, BuildOptions options,
                                           const std::function<bool(const std::string&, double)>& progress);
 
-/// What `collide` takes for a body and itself that are just apart: the median over random directions and attitudes, at
-/// a hundredth of the size from contact.
-double nanoseconds_a_query(const TreeView& tree);
-
 } // namespace prolate::cli

@@ -1,4 +1,6 @@
 // Starts and polish: whatever the start was, the result covers every piece.
+#include "builder/exchange.hpp"
+#include "builder/flat_set.hpp"
 #include "builder/polish.hpp"
 #include "builder/random.hpp"
 #include "builder/start.hpp"
@@ -138,6 +140,37 @@ TEST(SampledOutsideVolume, IsTheEllipsoidsVolumeOutsideTheSolid) {
         const Fit fit(Vec::Zero(), Vec(1.1, stretch, 1.2).asDiagonal().toDenseMatrix());
         EXPECT_NEAR(of(fit), fit.volume() - inner, 0.05 * fit.volume());
     }
+    const Fit fit(Vec(5, 0, 0), Mat::Identity()), same = fit, half(Vec(15, 0, 0), 10 * Mat::Identity());
+    EXPECT_EQ(sampled_outside_volume(fit, scene.field, std::vector{&same}), 0);
+    EXPECT_NEAR(sampled_outside_volume(fit, scene.field, std::vector{&half}), fit.volume() / 2, 0.1 * fit.volume());
+}
+
+TEST(Exchanges, GiveWhatIsTooMuchToWhereItIsMissing) {
+    const Scene scene(crowd());
+    const auto cells = scene.all_cells();
+    // Two ellipsoids for the first ball, and one for the last two.
+    std::vector<std::vector<uint32_t>> shares(5);
+    for (const uint32_t cell : cells) {
+        const Vec at = scene.cells.box(cell).center();
+        const auto ball = static_cast<size_t>(std::lround(at.x() / 3));
+        shares[ball == 0 ? (at.y() > 0 ? 4 : 0) : std::min<size_t>(ball, 3)].push_back(cell);
+    }
+    const std::vector<Fit> fits(5);
+    const auto sets = exchanges(
+        fits, shares, scene.cells, kMinRadius, [&](const Fit& fit) { return sampled_outside_volume(fit, scene.field); },
+        3);
+    ASSERT_EQ(sets.size(), 3u);
+    ASSERT_EQ(sets[0].size(), 5u);
+    const auto around = [](const Fit& fit) {
+        return fit.half_extents().maxCoeff() < 0.6 && fit.factor != Fit().factor;
+    };
+    EXPECT_TRUE(around(sets[0][0])); // the merged one
+    EXPECT_TRUE(around(sets[0][4])); // and the halves
+    EXPECT_TRUE(around(sets[0][3]));
+    EXPECT_LT(sets[0][0].center.head<2>().norm(), 0.1);
+    EXPECT_NEAR(std::abs(sets[0][3].center.x() - sets[0][4].center.x()), 3, 0.1);
+    EXPECT_EQ(sets[0][1].factor, fits[1].factor);
+    EXPECT_EQ(sets[0][2].factor, fits[2].factor);
 }
 
 // --- polish ---------------------------------------------------------------------------------------------------------
@@ -304,6 +337,35 @@ TEST(RefineSeams, CutsWhatNobodyHoldsAndNothingElse) {
         if (!held(set, scene.pieces, piece, 1.01)) {
             EXPECT_FALSE(scene.pieces.refine(piece));
         }
+}
+
+// --- flat sets ------------------------------------------------------------------------------------------------------
+
+// However many are asked for, those that are of no use make nothing worse.
+TEST(FlatSet, IsNoLooserWhereItIsSplit) {
+    for (const auto& scene : scenes()) {
+        const Solid solid{.pieces = scene->pieces,
+                          .cells = scene->cells,
+                          .field = scene->field,
+                          .columns = scene->columns,
+                          .area = 1,
+                          .outside = nullptr,
+                          .distance = nullptr};
+        const BuildOptions options;
+        FlatSetMaker sets(solid, options, effort_of(Quality::fast), kMinRadius);
+        FlatSet set = sets.make(6, nullptr, [](double) {});
+        for (const size_t count : {7u, 90u}) {
+            const double before = set.outside;
+            sets.split(set, count);
+            EXPECT_EQ(set.parts.size(), count);
+            EXPECT_LE(set.outside, before * (1 + 1e-6));
+            EXPECT_EQ(set.outside, scene->outside(fits_of(set.parts)));
+            std::vector<uint32_t> owner(scene->pieces.size(), UINT32_MAX);
+            for (uint32_t part = 0; part < set.parts.size(); ++part)
+                for (const uint32_t piece : set.parts[part].pieces) owner[piece] = part;
+            expect_cover(fits_of(set.parts), scene->pieces, owner);
+        }
+    }
 }
 
 } // namespace
