@@ -60,7 +60,7 @@ Result<Tree> Tree::rounded(float radius) && {
 }
 
 TreeView TreeView::coarser(uint32_t last) const noexcept {
-    if (last + 1 >= level_count_) return *this;
+    if (last >= level_count_ - 1) return *this;
     TreeView out = *this;
     out.bytes_ = bytes_.first(static_cast<size_t>(level(last).end_byte));
     out.is_prefix_ = true;

@@ -11,8 +11,8 @@ namespace prolate {
 
 /// out[i] = collide() of `a` at poses_a[i] and `b` at poses_b[i], for all i. A span of one pose stands for that pose at
 /// all i. Several poses at a time are first told apart by the ellipsoids around the roots, so the counters are not
-/// those of collide(), nor is a verdict `undecided` where that test suffices and a budget does not. The work is shared
-/// out among jobs.workers; each worker uses contexts[its number].
+/// those of collide(), and where that test suffices, the verdict is *separated* though a budget or max_level would have
+/// ended the search. The work is shared out among jobs.workers; each worker uses contexts[its number].
 ///
 /// Fails with bad_options if the lengths do not fit: `out` must be as long as the longer span of poses, and `contexts`
 /// at least as long as jobs.workers. The results do not depend on the jobs. Thread-safe on shared trees, allocates

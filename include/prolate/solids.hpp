@@ -30,8 +30,8 @@ struct SolidsOptions {
     uint64_t max_pair_tests = UINT64_MAX; ///< as QueryOptions has it, for both covers together
     float margin = 0;                     ///< solids at most this far apart count as meeting, metres
     /// The bodies may be displaced by so much against each other, metres, without the answer becoming wrong: what is
-    /// not known of the poses. Of triangles, only *separated* keeps to it. Lengths are taken as QueryOptions::margin
-    /// is.
+    /// not known of the poses. Of two exact trees, only *separated* keeps to it. Lengths are taken as
+    /// QueryOptions::margin is.
     float uncertainty = 0;
 };
 
@@ -45,7 +45,8 @@ struct SolidsResult {
 };
 
 /// Do the solids meet, or come within options.margin of each other? Symmetric but for the counters. Thread-safe on
-/// shared trees. One collide() of the outer covers, and if these meet, one of the inner ones.
+/// shared trees. A pose that is not finite, or whose quaternion is zero, leaves the answer open. One collide() of the
+/// outer covers, and if these meet, one of the inner ones.
 SolidsResult collide_solids(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                             Scratch context, const SolidsOptions& options = {}) noexcept;
 

@@ -65,10 +65,12 @@ DistanceResult of_rounded(const TreeView& a, const Pose& pose_a, const TreeView&
     if (out.upper > radii && out.upper - out.lower > wanted && out.lower < limits.max_distance) {
         limits.tolerance_absolute = wanted, limits.tolerance_relative = 0;
         limits.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests());
-        const QueryStats before = out.stats;
-        const DistanceResult closer = of_cores(a, pose_a, b, pose_b, context, limits, cache);
-        if (closer.lower >= out.lower && closer.upper <= out.upper) out = closer;
-        query::add(before, out.stats);
+        DistanceResult closer = of_cores(a, pose_a, b, pose_b, context, limits, cache);
+        query::add(out.stats, closer.stats);
+        if (closer.lower >= out.lower && closer.upper <= out.upper)
+            out = closer;
+        else
+            out.stats = closer.stats;
     }
     query::round_distance(out, a.radius(), b.radius(), options,
                           [&](const QueryOptions& o) { return collide(a, pose_a, b, pose_b, context, o); });

@@ -2,15 +2,21 @@
 //
 // What is certain of the inner covers: collide() calls leaves overlapping that rounding cannot tell apart, so the pair
 // that it names is asked again. test_pair() says `overlapping` only where a common point is certain
-// (query/ellipsoid/separation.hpp), and the upper bounds of distance_of() and depth_of() are certified
-// (query/ellipsoid/gap.hpp).
+// (query/ellipsoid/separation.hpp), and the upper bounds of distance_of(), depth_of() (query/ellipsoid/gap.hpp) and of
+// the distance of a triangle and an ellipsoid are certified. An ellipsoid that no triangle meets is within the solid by
+// more than the winding number of its center could be wrong by.
 #include <prolate/solids.hpp>
 
 #include "query/ellipsoid/gap.hpp"
 #include "query/node/limits.hpp"
 #include "query/node/scratch.hpp"
+#include "query/triangle/ellipsoid_distance.hpp"
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 namespace prolate {
@@ -29,6 +35,22 @@ bool is_solid(const TreeView& tree) {
     return tree.has_triangles() || !tree.is_exact(); // not a prefix of an exact tree
 }
 
+// Do two leaves certainly come within `within` of each other? If it is negative: do they meet, even if one of them is
+// displaced by that much?
+bool come_within(const query::PlacedEllipsoid& a, const query::PlacedEllipsoid& b, double within) {
+    if (within == 0) return query::test_pair(a, b).verdict == query::PairVerdict::overlapping;
+    return (within > 0 ? query::distance_of(a, b, 0) : query::depth_of(a, b, 0)).upper <= within;
+}
+// Here, some point x = c + L u + e of the triangle must lie in the ellipsoid, for which |u| + |e| / w <= 1 suffices, w
+// the smallest semi-axis. That also holds for the rounding of x itself.
+bool come_within(const query::PlacedTriangle& a, const query::PlacedEllipsoid& b, double within) {
+    const query::TriangleDistance d = query::distance(a, b);
+    if (within > 0 && d.upper <= within) return true;
+    const glm::dvec3 x = d.on_a - b.center, u = glm::inverse(b.factor) * x;
+    const double off = glm::length(x - b.factor * u) + query::kSeparationMargin * (a.reach + b.reach);
+    return glm::length(u) + (off - std::min(within, 0.0)) / query::least_width(b.factor, b.size) <= 1 - 0x1p-40;
+}
+
 // Both bodies, and what of the budget is spent.
 struct Solids {
     const TreeView &a, &b;
@@ -36,10 +58,13 @@ struct Solids {
     const Scratch scratch;
     const uint32_t level;
     const uint64_t budget;
+    const query::RelativePose b_to_a = query::relative_pose(pose_a, pose_b);
     QueryStats stats = {};
     std::optional<TreeView> inner_a = {}, inner_b = {}; // once they are looked for
 
-    bool may_be_asked() const { return is_solid(a) && is_solid(b) && query::suffices(scratch, a, b); }
+    bool may_be_asked() const {
+        return is_solid(a) && is_solid(b) && query::suffices(scratch, a, b) && std::isfinite(b_to_a.distance);
+    }
     bool are_triangles() const { return a.has_triangles() && b.has_triangles(); }
     bool find_inner() {
         inner_a = inner_cover(a, level);
@@ -47,35 +72,35 @@ struct Solids {
         return inner_a && inner_b && query::suffices(scratch, *inner_a, *inner_b);
     }
 
-    Verdict collide(const TreeView& x, const TreeView& y, float margin, MeetingPair& pair) {
+    CollideResult collide(const TreeView& x, const TreeView& y, float margin) {
         const CollideResult out =
             prolate::collide(x, pose_a, y, pose_b, scratch,
                              {.max_pair_tests = query::tests_left(budget, stats.tests()), .margin = margin});
         query::add(out.stats, stats);
-        pair = out.pair;
-        return out.verdict;
+        return out;
     }
-    Verdict outer_meet(float margin) {
-        MeetingPair pair;
-        return collide(outer_cover(a, level), outer_cover(b, level), margin, pair);
-    }
+    Verdict outer_meet(float margin) { return collide(outer_cover(a, level), outer_cover(b, level), margin).verdict; }
 
     // Do the inner covers, or what takes their place, certainly come within the margin of each other, even if they are
     // displaced by `uncertainty`? Undecided if the budget ended first.
     Verdict inner_meet(float margin, float uncertainty) {
-        const TreeView &x = *inner_a, &y = *inner_b;
-        MeetingPair pair;
-        const Verdict verdict = collide(x, y, margin, pair);
-        if (verdict != Verdict::overlapping || x.has_triangles() || y.has_triangles()) return verdict;
-        const query::PlacedEllipsoid p = query::place(x.ellipsoid(pair.node_a), x.scale()),
-                                     q = query::place(y.ellipsoid(pair.node_b), y.scale(),
-                                                      query::relative_pose(pose_a, pose_b));
-        const double within =
-            double{query::sound_length(margin)} + x.radius() + y.radius() - double{query::sound_length(uncertainty)};
-        const bool certain = within == 0  ? query::test_pair(p, q).verdict == query::PairVerdict::overlapping
-                             : within > 0 ? query::distance_of(p, q, 0).upper <= within
-                                          : query::depth_of(p, q, 0).upper <= within;
-        return certain ? Verdict::overlapping : Verdict::separated; // as far as can be told
+        margin = query::sound_length(margin), uncertainty = query::sound_length(uncertainty);
+        // The pair that is named is as near as that, so that it is certain but for rounding.
+        const CollideResult found = collide(*inner_a, *inner_b, std::max(0.0f, margin - uncertainty));
+        if (found.verdict != Verdict::overlapping) return found.verdict;
+        const double within = double{margin} + inner_a->radius() + inner_b->radius() - double{uncertainty};
+        return come_within(found, within) ? Verdict::overlapping : Verdict::separated; // as far as can be told
+    }
+    bool come_within(const CollideResult& found, double within) const {
+        if (found.enclosed) return within >= 0;
+        const auto [node_a, node_b, triangle_a, triangle_b] = found.pair;
+        const auto ellipsoid_a = [&] { return query::place(inner_a->ellipsoid(node_a), inner_a->scale()); };
+        const auto ellipsoid_b = [&] { return query::place(inner_b->ellipsoid(node_b), inner_b->scale(), b_to_a); };
+        if (triangle_a != kNoTriangle)
+            return prolate::come_within(query::place(*inner_a, triangle_a), ellipsoid_b(), within);
+        if (triangle_b != kNoTriangle)
+            return prolate::come_within(query::place(*inner_b, triangle_b, b_to_a), ellipsoid_a(), within);
+        return prolate::come_within(ellipsoid_a(), ellipsoid_b(), within);
     }
 
     DistanceResult distance(const TreeView& x, const TreeView& y, DistanceOptions options) {

@@ -729,7 +729,7 @@ TEST(Format, ACoarserTreeIsThatOfThePrefix) {
             });
         }
         EXPECT_EQ(whole.coarser(2).bytes().size(), file.size());
-        EXPECT_EQ(whole.coarser(kMaxLevels).is_prefix(), false);
+        for (const uint32_t beyond : {kMaxLevels, UINT32_MAX}) EXPECT_FALSE(whole.coarser(beyond).is_prefix());
     }
 }
 

@@ -133,6 +133,20 @@ TEST(Rounded, CapsulesAreAsFarApartAsTheirSegmentsLessTheRadii) {
     });
 }
 
+TEST(Rounded, BudgetsOfDistancesAreKept) {
+    Random random(7);
+    const auto context = std::make_unique<QueryContext>();
+    const Tree prism = *cylinder_tree(0.5f, 1, 128);
+    const TreeView round = *prism.view().rounded(0.2f);
+    for (uint32_t i = 0; i < 2000; ++i) {
+        const Pose p = scenes::pose_at(random, 0), q = scenes::pose_at(random, random.in(1, 3));
+        const uint64_t budget = random.below(400);
+        const DistanceResult d =
+            distance(round, p, prism.view(), q, *context, {.max_level = random.below(4), .max_pair_tests = budget});
+        ASSERT_LE(d.stats.tests(), budget);
+    }
+}
+
 TEST(Rounded, BallsAndBoxes) {
     const Vec3 half{0.5f, 0.7f, 0.4f};
     const auto box = *box_tree(half);

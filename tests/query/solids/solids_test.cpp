@@ -207,12 +207,48 @@ TEST_F(Solids, BudgetsAndBadPosesClaimNothingWrong) {
         }
     }
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    for (const Pose& bad : {Pose{{nan, 0, 0}, {}}, Pose{{}, {0, 0, 0, 0}}}) {
-        EXPECT_NE(collide_solids(x, bad, y, {}, context()).verdict, Verdict::separated);
-        EXPECT_EQ(collide_solids(x, {}, y, bad, context()).verdict, Verdict::undecided);
-        const SolidsDistance d = distance_solids(x, bad, y, {}, context());
-        EXPECT_EQ(d.lower, 0);
-        EXPECT_EQ(d.upper, std::numeric_limits<double>::infinity());
+    for (const Pose& bad : {Pose{{nan, 0, 0}, {}}, Pose{{}, {0, 0, 0, 0}}})
+        for (const TreeView& other : {y, crossed().exact.view()}) {
+            EXPECT_EQ(collide_solids(x, bad, other, {}, context()).verdict, Verdict::undecided);
+            EXPECT_EQ(collide_solids(other, {}, x, bad, context()).verdict, Verdict::undecided);
+            const SolidsDistance d = distance_solids(x, bad, other, {}, context());
+            EXPECT_EQ(d.verdict, Verdict::undecided);
+            EXPECT_EQ(d.lower, 0);
+            EXPECT_EQ(d.upper, std::numeric_limits<double>::infinity());
+        }
+}
+
+// collide() of triangles and ellipsoids 1e-8 of their size cannot tell gaps of a quarter of the ellipsoid: these meet,
+// but not certainly.
+TEST_F(Solids, TinyCoversMeetTrianglesOnlyWhereThatIsCertain) {
+    Random random(5);
+    const Vec3 corners[] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const Triangle faces[] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
+    const Tree corner = *convex_tree(corners, faces);
+    for (const float size : {1e-2f, 1e-8f, 1e-11f}) {
+        const TreeView tiny = *torus().covers.view().scaled(size), exact = *torus().exact.view().scaled(size);
+        int meet = 0;
+        for (int i = 0; i < 300; ++i) {
+            const Pose pose{{}, random.rotation()};
+            if (collide_solids(corner.view(), {}, tiny, pose, context()).verdict != Verdict::overlapping) continue;
+            ++meet;
+            ASSERT_NE(collide(corner.view(), {}, exact, pose, context()).verdict, Verdict::separated) << size;
+        }
+        EXPECT_GT(meet, 150) << size;
+    }
+}
+
+TEST_F(Solids, LargerMarginsStayCertain) {
+    Random random(6);
+    const TreeView x = torus().covers.view(), y = crossed().covers.view();
+    for (int i = 0; i < 1000; ++i) {
+        const Pose a{{}, random.rotation()}, b = near_pose(random);
+        const auto uncertainty = static_cast<float>(random.log_in(1e-3, 0.1));
+        const auto verdict = [&](float margin) {
+            return collide_solids(x, a, y, b, context(), {.margin = margin, .uncertainty = uncertainty}).verdict;
+        };
+        const float margin = uncertainty * static_cast<float>(random.in(1, 3));
+        ASSERT_TRUE(verdict(0) != Verdict::overlapping || verdict(margin) == Verdict::overlapping) << i;
     }
 }
 
