@@ -93,13 +93,15 @@ struct Solids {
     }
     bool come_within(const CollideResult& found, double within) const {
         if (found.enclosed) return within >= 0;
-        const auto [node_a, node_b, triangle_a, triangle_b] = found.pair;
-        const auto ellipsoid_a = [&] { return query::place(inner_a->ellipsoid(node_a), inner_a->scale()); };
-        const auto ellipsoid_b = [&] { return query::place(inner_b->ellipsoid(node_b), inner_b->scale(), b_to_a); };
-        if (triangle_a != kNoTriangle)
-            return prolate::come_within(query::place(*inner_a, triangle_a), ellipsoid_b(), within);
-        if (triangle_b != kNoTriangle)
-            return prolate::come_within(query::place(*inner_b, triangle_b, b_to_a), ellipsoid_a(), within);
+        const MeetingPair& pair = found.pair;
+        const auto ellipsoid_a = [&] { return query::place(inner_a->ellipsoid(pair.node_a), inner_a->scale()); };
+        const auto ellipsoid_b = [&] {
+            return query::place(inner_b->ellipsoid(pair.node_b), inner_b->scale(), b_to_a);
+        };
+        if (pair.triangle_a != kNoTriangle)
+            return prolate::come_within(query::place(*inner_a, pair.triangle_a), ellipsoid_b(), within);
+        if (pair.triangle_b != kNoTriangle)
+            return prolate::come_within(query::place(*inner_b, pair.triangle_b, b_to_a), ellipsoid_a(), within);
         return prolate::come_within(ellipsoid_a(), ellipsoid_b(), within);
     }
 
