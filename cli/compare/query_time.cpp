@@ -1,8 +1,10 @@
 #include "cli/compare/query_time.hpp"
 
 #include <prolate/collide.hpp>
+#include <prolate/matrix.hpp>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -22,6 +24,17 @@ Quat random_rotation(std::mt19937& random) {
     return {q.x / length, q.y / length, q.z / length, q.w / length};
 }
 
+// Turned, and moved so that `center` comes to lie at `to`.
+Pose centered(const Quat& rotation, const Vec3& center, const std::array<double, 3>& to) {
+    Pose out{{}, rotation};
+    const Matrix4 turn = to_matrix(out);
+    const auto at = [&](size_t i) {
+        return static_cast<float>(to[i] - turn.m[i][0] * center.x - turn.m[i][1] * center.y - turn.m[i][2] * center.z);
+    };
+    out.translation = {at(0), at(1), at(2)};
+    return out;
+}
+
 } // namespace
 
 double nanoseconds_a_query(const TreeView& tree) {
@@ -30,16 +43,18 @@ double nanoseconds_a_query(const TreeView& tree) {
     std::normal_distribution<float> normal;
     const auto context = std::make_unique<QueryContext>();
     const double size = tree.bake_info().diagonal;
+    const Vec3 center = tree.root_bound().center;
     std::vector<double> times;
     for (int n = 0; n < kPoses; ++n) {
-        Pose a, b;
-        a.rotation = random_rotation(random), b.rotation = random_rotation(random);
+        const Quat turn_a = random_rotation(random), turn_b = random_rotation(random);
         float direction[3];
         for (float& x : direction) x = normal(random);
         const float length = std::hypot(direction[0], direction[1], direction[2]);
+        const Pose a = centered(turn_a, center, {});
+        Pose b;
         const auto place = [&](double t) {
-            const float by = static_cast<float>(t) / length;
-            b.translation = {by * direction[0], by * direction[1], by * direction[2]};
+            const double by = t / double{length};
+            b = centered(turn_b, center, {by * direction[0], by * direction[1], by * direction[2]});
         };
         double low = 0, high = 4 * size;
         for (int i = 0; i < 20; ++i) {
