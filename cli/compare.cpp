@@ -111,7 +111,7 @@ Outcome<ExitCode> run(CompareArguments& a) {
     if (const auto possible = check_lengths(a.asset, *options, read->view()); !possible) return possible.error();
     const auto mesh = clean(read->view(), options->weld);
     if (!mesh) return failure_of(a.asset.mesh, mesh.error());
-    describe_mesh(a.asset.mesh, mesh->report, false);
+    describe_mesh(a.asset.mesh, mesh->report, {.filled = options->fill > 0});
     const auto choices = [&] {
         ProgressLine line;
         return make_choices(a.asset.mesh, *mesh, *options,

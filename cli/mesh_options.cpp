@@ -58,7 +58,7 @@ std::string size_text(const MeshReport& report) {
     return fmt::format("{:.6g} x {:.6g} x {:.6g} m", report.size[0], report.size[1], report.size[2]);
 }
 
-void describe_mesh(const std::string& path, const MeshReport& report, bool for_exact_tree) {
+void describe_mesh(const std::string& path, const MeshReport& report, TreeKind tree) {
     // Some readers give each triangle corners of its own, so the number merged says little of the file.
     const uint32_t distinct =
         report.input_vertices - report.merged_vertices - report.welded_vertices - report.unused_vertices;
@@ -67,8 +67,8 @@ void describe_mesh(const std::string& path, const MeshReport& report, bool for_e
     if (report.welded_vertices > 0)
         note(path, fmt::format("{} vertices joined with others up to {:.2g} m away, which closes the mesh; {}",
                                grouped(report.welded_vertices), report.weld_distance,
-                               for_exact_tree ? "answers are for the joined mesh"
-                                              : "the surface is covered as it was before, too"));
+                               tree.exact ? "answers are for the joined mesh"
+                                          : "the surface is covered as it was before, too"));
     if (report.turned_shells > 0)
         note(path, fmt::format("{} closed part{} inside out: reversed", grouped(report.turned_shells),
                                report.turned_shells == 1 ? " was" : "s were"));
@@ -76,9 +76,9 @@ void describe_mesh(const std::string& path, const MeshReport& report, bool for_e
         note(path, fmt::format("{} triangles have no area", grouped(report.degenerate_triangles)));
     if (report.non_manifold_edges > 0)
         note(path, fmt::format("{} edges belong to three or more triangles", grouped(report.non_manifold_edges)));
-    if (!report.closed && report.open_edges == 0)
+    if (!report.closed && report.open_edges == 0 && !tree.filled)
         note(path, "each triangle is also there in reverse, so the mesh encloses nothing (surface mode)");
-    if (report.open_edges > 0)
+    if (report.open_edges > 0 && !tree.filled)
         note(path,
              fmt::format("{} open edges: no inside can be promised, so only the triangles are covered (surface mode)",
                          grouped(report.open_edges)));

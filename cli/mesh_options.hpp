@@ -41,8 +41,12 @@ struct MeshOfTree {
 /// Reads the mesh as it was read when the tree was baked, unless `options` say otherwise.
 Outcome<MeshOfTree> read_mesh_of(const TreeView& tree, const std::string& path, const MeshOptions& options);
 
-/// What the user should know of the mesh that a tree of either kind is of, a line each on stderr.
-void describe_mesh(const std::string& path, const MeshReport& report, bool for_exact_tree);
+struct TreeKind {
+    bool exact = false;
+    bool filled = false; ///< it covers the filled solid, which is closed
+};
+/// What the user should know of the mesh that a tree is of, a line each on stderr.
+void describe_mesh(const std::string& path, const MeshReport& report, TreeKind tree);
 
 /// "1 x 2 x 0.5 m"
 std::string size_text(const MeshReport& report);

@@ -107,7 +107,8 @@ Outcome<ExitCode> run(const VerifyArguments& a) {
     if (!tree) return tree.error();
     const auto mesh = read_mesh_of(tree->view(), a.mesh, a.mesh_options);
     if (!mesh) return mesh.error();
-    describe_mesh(a.mesh, mesh->cleaned.report, tree->view().bake_info().exact);
+    const BakeInfo info = tree->view().bake_info();
+    describe_mesh(a.mesh, mesh->cleaned.report, {.exact = info.exact, .filled = info.fill > 0});
     if (!mesh->own) note(a.tree, "this tree was baked from another mesh");
     const auto report = [&] {
         ProgressLine line;

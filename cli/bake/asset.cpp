@@ -79,7 +79,7 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     }();
     if (built && interrupted()) built = Error{ErrorCode::cancelled};
     if (!built) return failure_of(a.mesh, built.error());
-    describe_mesh(a.mesh, built->mesh, options->exact);
+    describe_mesh(a.mesh, built->mesh, {.exact = options->exact, .filled = options->fill > 0});
     Baked baked{Source::baked, std::move(built->tree), built->mesh, {}, built->hole_radius};
     for (const LevelReport& level : built->levels) baked.level_seconds.push_back(level.seconds);
     return baked;

@@ -333,6 +333,7 @@ TEST_F(Cli, AFilledTreeSaysSoAndIsVerified) {
     const std::string mesh = file("open.obj", obj_text(open)), out = file("out.etree");
     const Outcome baked = run({"bake", mesh, "-o", out, "--quality", "fast", "--levels", "1", "--fill", "60cm"});
     ASSERT_EQ(baked.code, 0) << baked.err;
+    EXPECT_EQ(baked.err.find("open edges"), std::string::npos) << baked.err; // the filled solid has none
     EXPECT_NE(run({"info", out}).out.find("filled    what a ball of radius 0.6 cannot reach"), std::string::npos);
     EXPECT_EQ(Json::parse(run({"info", out, "--json"}).out)["fill"], 0.6);
     const Outcome verified = run({"verify", out, mesh});
