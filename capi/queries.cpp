@@ -4,6 +4,7 @@
 #include <prolate/bounds.hpp>
 #include <prolate/collide.hpp>
 #include <prolate/contacts.hpp>
+#include <prolate/deform.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/half_space.hpp>
 #include <prolate/points.hpp>
@@ -160,6 +161,36 @@ prolate_status prolate_distance_solids(prolate_body a, prolate_body b, void* scr
                                              capi::options_of(given));
     auto out = fresh<prolate_solids_distance>();
     out.verdict = verdict_of(r.verdict), out.lower = r.lower, out.upper = r.upper, out.stats = stats_of(r.stats);
+    write(out, result);
+    return PROLATE_OK;
+}
+
+uint32_t prolate_mode_count(const prolate_tree* tree) {
+    const TreeView* const view = view_of(tree);
+    const auto modes = view != nullptr ? view->deformation() : std::nullopt;
+    return modes ? modes->mode_count() : 0;
+}
+
+float prolate_mode_range(const prolate_tree* tree, uint32_t mode) {
+    return mode < prolate_mode_count(tree) ? view_of(tree)->deformation()->range(mode) : 0;
+}
+
+prolate_status prolate_collide_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
+                                        size_t scratch_size, const prolate_query_options* options,
+                                        prolate_deformed_result* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({a.body.tree, b.body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    for (const prolate_deformed_body& body : {a, b})
+        if (body.q == nullptr && body.q_count > 0) return PROLATE_BAD_ARGUMENT;
+    const auto deformed = [](const TreeView& tree, const prolate_deformed_body& body) {
+        return DeformedBody{tree, same<Pose>(body.body.pose), {body.q, body.q_count}};
+    };
+    const DeformedCollideResult r =
+        collide(deformed(call.a(), a), deformed(call.b(), b), call.scratch, capi::options_of(given));
+    auto out = fresh<prolate_deformed_result>();
+    out.verdict = verdict_of(r.verdict), out.reason = static_cast<prolate_undecided>(r.reason);
+    out.enclosed = r.enclosed, out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
     write(out, result);
     return PROLATE_OK;
 }

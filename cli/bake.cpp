@@ -33,6 +33,10 @@ With --inner, the file also holds a second tree, of ellipsoids that are proved t
 ellipsoids of two bodies are apart, so are the solids; where the inner ones meet, so do the solids. Goes with every goal
 and with --exact, and leaves the tree itself as it is.
 
+With --modes, the body deforms: at coordinates q, each vertex is moved by the sum of q times its displacements, and all
+nodes are proved to hold it for every q within the ranges. Displacements are those of the vertices as the file has
+them, in its unit; vertices in one place must move alike. numpy.savez(path, modes=..., ranges=...) writes such a file.
+
 With --exact, the tree goes down to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover
 the surface only, and queries answer for the triangles. 100,000 triangles take about a second, whatever the quality.
 
@@ -76,6 +80,7 @@ Examples:
   prolate bake plate.3mf -o plate.etree --keep-holes 4mm --clearance 1mm         # a machined part, its holes free
   prolate bake part.dae -o part.etree --unit mm
   prolate bake horse.obj -o band.etree --ellipsoids 64 --inner 64                # from outside and from inside
+  prolate bake horse.obj -o moving.etree --ellipsoids 64 --modes modes.npz       # deforms; or modes.npy --range 0.5
   prolate bake site.obj -o site.etree --recentre
   prolate bake horse.obj -o - | ssh robot 'cat > horse.etree'
   prolate bake --manifest assets.json
@@ -101,9 +106,9 @@ Outcome<ExitCode> run_one(BakeArguments& a) {
     if (baked->source == Source::unchanged)
         note(a.asset.output, "unchanged: made from this mesh with these options (--rebake bakes it again)");
     if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--rebake bakes it again)");
-    const std::string shown =
-        a.json ? text_of(report_of(a.asset, *baked))
-               : level_table(baked->tree.view(), baked->level_seconds) + inner_text(baked->tree.view());
+    const std::string shown = a.json ? text_of(report_of(a.asset, *baked))
+                                     : level_table(baked->tree.view(), baked->level_seconds) +
+                                           inner_text(baked->tree.view()) + modes_text(baked->tree.view());
     if (is_quiet() && !a.json) return kDone;
     if (is_standard_output(a.asset.output))
         fmt::print(stderr, "{}", shown);

@@ -110,10 +110,23 @@ std::string inner_text(const TreeView& tree) {
                        grouped(inner->bytes().size()));
 }
 
+std::string modes_text(const TreeView& tree) {
+    const auto modes = tree.deformation();
+    if (!modes) return "";
+    std::string ranges;
+    for (uint32_t m = 0; m < modes->mode_count(); ++m)
+        ranges += fmt::format("{}{:g}", m == 0 ? "" : ", ", modes->range(m));
+    return fmt::format("  deforms   by {} mode{}, coordinates within {}; proved\n", modes->mode_count(),
+                       modes->mode_count() == 1 ? "" : "s", ranges);
+}
+
 nlohmann::ordered_json header_json(const TreeView& tree) {
     const BakeInfo info = tree.bake_info();
     nlohmann::ordered_json out;
     out["bytes"] = tree.bytes().size();
+    out["mode_ranges"] = nlohmann::ordered_json::array();
+    if (const auto modes = tree.deformation())
+        for (uint32_t m = 0; m < modes->mode_count(); ++m) out["mode_ranges"].push_back(modes->range(m));
     out["nodes"] = tree.node_count();
     out["blocks"] = tree.block_count();
     out["bytes_per_node"] = bytes_per_node(tree);

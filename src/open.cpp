@@ -7,6 +7,7 @@
 #include <prolate/tree.hpp>
 
 #include "src/bytes.hpp"
+#include "src/deformation.hpp"
 #include "src/format.hpp"
 #include "src/hash.hpp"
 #include "src/hull.hpp"
@@ -533,16 +534,33 @@ Result<void> TreeView::open_sections(size_t begin, bool check_hash) noexcept {
         if (!end) return end.error();
         next = *end;
         const auto [kind, content] = section(section_count_++);
-        if (std::memcmp(kind, kInnerKind, sizeof kInnerKind) != 0) continue; // skipped, if it is not known
-        const size_t where = at + kSectionContent;
-        if (!inner_.empty()) return bad("two inner covers", at);
-        if (content.size() < kHeaderBytes || (load_le<uint32_t>(content.data() + kAtFlags) & kInner) == 0)
-            return bad("an inner cover that says it is none", where);
-        const auto tree = open(content, {.check_hash = check_hash}); // it has no sections: no deeper than this
-        if (!tree) return Error{tree.error().code, tree.error().what, tree.error().where + where};
-        if (tree->is_prefix()) return bad("an inner cover that is cut off", where);
-        inner_ = content;
+        const auto is = [&kind](const char(&known)[4]) { return std::memcmp(kind, known, sizeof known) == 0; };
+        const auto sound = is(kInnerKind)         ? open_inner(content, at, check_hash)
+                           : is(kDeformationKind) ? open_deformation(content, at)
+                                                  : Result<void>{}; // skipped, if it is not known
+        if (!sound) return sound;
     }
+    return {};
+}
+
+// The section at `at`.
+Result<void> TreeView::open_inner(std::span<const std::byte> content, size_t at, bool check_hash) noexcept {
+    const size_t where = at + kSectionContent;
+    if (!inner_.empty()) return bad("two inner covers", at);
+    if (content.size() < kHeaderBytes || (load_le<uint32_t>(content.data() + kAtFlags) & kInner) == 0)
+        return bad("an inner cover that says it is none", where);
+    const auto tree = open(content, {.check_hash = check_hash}); // it has no sections: no deeper than this
+    if (!tree) return Error{tree.error().code, tree.error().what, tree.error().where + where};
+    if (tree->is_prefix()) return bad("an inner cover that is cut off", where);
+    inner_ = content;
+    return {};
+}
+
+Result<void> TreeView::open_deformation(std::span<const std::byte> content, size_t at) noexcept {
+    if (!modes_.empty()) return bad("two deformations", at);
+    if (const auto sound = check_deformation(content, *this); !sound)
+        return bad(sound.error().what, at + kSectionContent + static_cast<size_t>(sound.error().where));
+    modes_ = content;
     return {};
 }
 

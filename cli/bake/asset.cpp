@@ -1,6 +1,7 @@
 #include "cli/bake/asset.hpp"
 
 #include "cli/bake/goals.hpp"
+#include "cli/bake/modes_file.hpp"
 #include "cli/console.hpp"
 #include "cli/inputs.hpp"
 #include "cli/length.hpp"
@@ -27,6 +28,7 @@ namespace fs = std::filesystem;
 // The tree in the output file, if there is one to be looked at.
 std::optional<Tree> old_output(const Asset& a) {
     std::error_code none;
+    if (!a.modes.empty()) return {}; // of which the options' hash knows nothing
     if (is_standard_output(a.output) || !fs::is_regular_file(a.output, none)) return {};
     auto tree = load(a.output.c_str());
     if (!tree) return {};
@@ -85,6 +87,21 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     return baked;
 }
 
+// Gives the tree its modes, if there are any. The cache holds trees without: it knows no modes.
+Outcome<> deform(const Asset& a, Baked& baked) {
+    if (a.modes.empty()) return kSuccess;
+    const auto import = import_options(a.mesh_options);
+    if (!import) return import.error();
+    const auto mesh = read_mesh(a.mesh, *import);
+    if (!mesh) return mesh.error();
+    const auto modes = read_modes(a.modes, a.ranges, mesh->placement.scale);
+    if (!modes) return modes.error();
+    auto deforming = add_modes(baked.tree.view(), mesh->view(), modes->view());
+    if (!deforming) return failure_of(a.modes, deforming.error());
+    baked.tree = std::move(*deforming);
+    return kSuccess;
+}
+
 } // namespace
 
 void declare_asset_options(CLI::App& app, Asset& a) {
@@ -108,6 +125,12 @@ void declare_asset_options(CLI::App& app, Asset& a) {
     app.add_option(
         "--inner", a.options.inner,
         "also an inner cover: at most so many ellipsoids, 1 ... 65536, inside the solid; the mesh must be closed");
+    app.add_option("--modes", a.modes,
+                   "how the mesh deforms, .npz or .npy of shape (modes, vertices, 3): the nodes hold it as it moves");
+    app.add_option("--range", a.ranges,
+                   "largest coordinate of all modes, or of each; in the place of the file's \"ranges\"")
+        ->delimiter(',')
+        ->expected(1, 64);
     app.add_option("--method", a.method, "how outside volumes are found: voxel or analytic")->capture_default_str();
     app.add_option("--primitive", a.primitive, "what the nodes are: ellipsoid or sphere")->capture_default_str();
     app.add_option("--alpha", a.options.alpha, "weight of the surface error")->capture_default_str();
@@ -181,6 +204,7 @@ Outcome<BuildOptions> options_of(const Asset& a) {
 
 void name_inputs(const Asset& a, Outputs& outputs, const std::string& whose) {
     outputs.reads_mesh(a.mesh, "the mesh" + whose);
+    outputs.reads(a.modes, "the modes" + whose);
 }
 
 Outcome<> claim_outputs(const Asset& a, Outputs& outputs, const std::string& whose) {
@@ -196,6 +220,7 @@ Outcome<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cac
     if (!baked) return baked;
     if (const auto close = check_closeness(a, *baked); !close) return close.error();
     cache.keep(baked->tree.view(), baked->source == Source::baked);
+    if (const auto moving = deform(a, *baked); !moving) return moving.error();
     if (!baked->tree.view().bake_info().goal_reached)
         note(a.mesh, "the number asked for was not reached at this resolution; try --quality best");
     if (baked->source == Source::unchanged) {

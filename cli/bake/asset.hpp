@@ -28,6 +28,8 @@ struct Asset {
     std::optional<uint32_t> levels, ellipsoids;
     std::optional<float> tolerance, distance;
     std::string clearance, fill, keep_holes; ///< lengths with their units
+    std::string modes;                       ///< a file
+    std::vector<float> ranges;
     MeshOptions mesh_options;
     BuildOptions options;
 };

@@ -28,7 +28,8 @@ std::string source_text(uint64_t file, uint64_t source) {
 
 bool is_bake_of(const TreeView& tree, uint64_t source, uint64_t options) {
     const BakeInfo info = tree.bake_info();
-    return info.source_hash == source && info.options_hash == options && info.proved && !tree.is_prefix();
+    return info.source_hash == source && info.options_hash == options && info.proved && !tree.is_prefix() &&
+           !tree.deformation(); // of which the options say nothing
 }
 
 std::string BakeCache::path(const std::string& name) const {

@@ -125,7 +125,7 @@ Outcome<std::vector<Entry>> read_manifest(const std::string& path, const Manifes
             return refuse(unknown_key(item.key(), {"assets", "defaults"}));
     const Json defaults = root.value("defaults", Json::object());
     if (!defaults.is_object()) return refuse("\"defaults\" must be an object");
-    for (const char* own : {"mesh", "output", "report"})
+    for (const char* own : {"mesh", "output", "report", "modes"})
         if (defaults.contains(own))
             return refuse(fmt::format("\"{}\" belongs to each asset, not to the defaults", own));
     Asset unused;
@@ -145,9 +145,10 @@ Outcome<std::vector<Entry>> read_manifest(const std::string& path, const Manifes
         entry.error = set_options(merged(defaults, from), asset);
         for (const char* needed : {"mesh", "output"})
             if (entry.error.empty() && !from.contains(needed)) entry.error = fmt::format("\"{}\" is missing", needed);
-        for (std::string* file : {&asset.mesh, &asset.output, &asset.report}) {
+        for (std::string* file : {&asset.mesh, &asset.output, &asset.report, &asset.modes}) {
             if (file->empty()) continue;
-            if (file != &asset.mesh && is_standard_output(*file)) entry.error = "cannot go to standard output";
+            if (file != &asset.mesh && file != &asset.modes && is_standard_output(*file))
+                entry.error = "cannot go to standard output";
             if (file == &asset.mesh && is_standard_input(*file)) entry.error = "cannot come from standard input";
             *file = (folder / *file).string();
         }

@@ -254,6 +254,36 @@ PROLATE_API prolate_status prolate_distance_solids(prolate_body a, prolate_body 
                                                    const prolate_distance_options* options,
                                                    prolate_solids_distance* result);
 
+/** deform.hpp: DeformedBody. `q` may be null where `q_count` is 0: all coordinates are 0. */
+typedef struct prolate_deformed_body {
+    prolate_body body;
+    const float* q;
+    uint32_t q_count;
+} prolate_deformed_body;
+/** Why nothing was decided. */
+typedef enum prolate_undecided {
+    PROLATE_DECIDED = 0,
+    PROLATE_UNDECIDED_COORDINATES = 1, /**< another number than the tree has modes, out of range, or NaN */
+    PROLATE_UNDECIDED_INPUT = 2,       /**< a pose or a ray that is not finite */
+    PROLATE_UNDECIDED_BUDGET = 3
+} prolate_undecided;
+typedef struct prolate_deformed_result {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    prolate_undecided reason;
+    bool enclosed;
+    prolate_meeting_pair pair;
+    prolate_stats stats;
+} prolate_deformed_result;
+/** Modes of the tree's deformation; 0 if it has none, or `tree` was not opened. */
+PROLATE_API uint32_t prolate_mode_count(const prolate_tree* tree);
+/** Largest absolute value of coordinate `mode`; 0 if there is no such mode. */
+PROLATE_API float prolate_mode_range(const prolate_tree* tree, uint32_t mode);
+/** deform.hpp: collide(). */
+PROLATE_API prolate_status prolate_collide_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
+                                                    size_t scratch_size, const prolate_query_options* options,
+                                                    prolate_deformed_result* result);
+
 /** contacts.hpp: ContactPoint, Manifold, ContactManifolds. Set the last to 0 before its first use; keep it from one
  * query to the next. */
 typedef struct prolate_contact_point {

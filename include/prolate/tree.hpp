@@ -21,6 +21,7 @@
 #pragma once
 
 #include <prolate/bake_info.hpp>
+#include <prolate/deformation.hpp>
 #include <prolate/detail/tree_bytes.hpp>
 #include <prolate/error.hpp>
 #include <prolate/types.hpp>
@@ -67,7 +68,7 @@ struct TriangleRange {
 
 /// What follows the tree in its file (src/FORMAT.md, "Sections").
 struct Section {
-    char kind[4];                       ///< printable; "INNR": an inner cover
+    char kind[4];                       ///< printable; "INNR": an inner cover, "DFRM": a deformation
     std::span<const std::byte> content; ///< of the file's bytes
 };
 
@@ -110,6 +111,10 @@ public:
     /// is scaled and rounded like this tree. bake_info().inner is true of it. solids.hpp asks about both covers. Takes
     /// about as long as one ellipsoid takes to decode.
     std::optional<TreeView> inner() const noexcept;
+
+    /// How the mesh deforms by modes, and what that does to the nodes, if the file says it: deform.hpp asks about bodies
+    /// that deform. All other queries answer for the body at rest. Lengths are as stored, before scaled().
+    std::optional<Deformation> deformation() const noexcept;
 
     /// Version of the format that the bytes are in.
     uint16_t format_version() const noexcept;
@@ -198,6 +203,8 @@ private:
     Result<void> open_nodes(uint32_t present, bool exact, bool check_hash) noexcept;
     Result<void> open_triangles(size_t hulls, bool check_hash) noexcept;
     Result<void> open_sections(size_t begin, bool check_hash) noexcept;
+    Result<void> open_inner(std::span<const std::byte> content, size_t at, bool check_hash) noexcept;
+    Result<void> open_deformation(std::span<const std::byte> content, size_t at) noexcept;
     static TreeView of_checked(std::span<const std::byte> bytes) noexcept;
     void count_levels(uint32_t count) noexcept;
     template <class Visit> void for_each_node_in(uint32_t begin, uint32_t end, Visit&& visit) const {
@@ -206,6 +213,7 @@ private:
     }
     std::span<const std::byte> bytes_;
     std::span<const std::byte> inner_; // the file of the inner cover; empty without
+    std::span<const std::byte> modes_; // the section of the deformation; empty without
     size_t sections_ = 0;              // where they begin
     detail::TreeBytes raw_;
     Ellipsoid root_, root_bound_;

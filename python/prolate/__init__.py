@@ -2,8 +2,9 @@
 
 :func:`bake` makes a tree of a mesh, each level of which is proved to cover it. :func:`collide`, :func:`distance`,
 :func:`contacts`, :func:`sweep`, :func:`raycast` and :func:`overlap` ask about trees at many poses at once,
-:func:`collide_solids` and :func:`distance_solids` about the solids that covers stand for, :class:`World` about many
-bodies, and :mod:`prolate.pairs` about single ellipsoids. docs/python.md is the tour.
+:func:`collide_solids` and :func:`distance_solids` about the solids that covers stand for, :func:`collide_deformed`
+about bodies that deform, :class:`World` about many bodies, and :mod:`prolate.pairs` about single ellipsoids.
+docs/python.md is the tour.
 """
 
 from . import pairs
@@ -17,6 +18,7 @@ from ._primitives import box_tree, convex_tree, cylinder_tree, ellipsoid_tree, s
 from ._queries import (
     bounds,
     collide,
+    collide_deformed,
     collide_solids,
     contacts,
     contains,
@@ -87,6 +89,7 @@ __all__ = [
     "bounds",
     "box_tree",
     "collide",
+    "collide_deformed",
     "collide_solids",
     "contacts",
     "contains",

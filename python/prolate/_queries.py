@@ -162,6 +162,46 @@ def collide_solids(
     return _VERDICTS[found] if isinstance(found, int) else found
 
 
+def collide_deformed(
+    a: Tree,
+    poses_a: ArrayLike,
+    b: Tree,
+    poses_b: ArrayLike,
+    *,
+    q_a: ArrayLike | None = None,
+    q_b: ArrayLike | None = None,
+    margin: float = 0,
+    max_level: int | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> Any:
+    """Do two bodies that deform by modes meet, at each of N poses and coordinates? Without a vertex, by their nodes.
+
+    ``SEPARATED`` is certain of the deformed meshes. ``OVERLAPPING``: deformed triangles meet, or of trees without
+    triangles leaf ellipsoids, as their coordinates move and enlarge them; or one body may lie inside the other.
+
+    Parameters
+    ----------
+    a, poses_a, b, poses_b, margin, max_level, budget, threads, order
+        As for :func:`collide`. Trees of :meth:`Tree.with_modes`, or rigid ones.
+    q_a, q_b : array of shape (M,) or (N, M), optional
+        Coordinates of the bodies, rounded to float32; without, they are at rest. One row goes with all of the others.
+
+    Returns
+    -------
+    uint8 array of shape (N,), or a Verdict if poses and coordinates are single
+        ``UNDECIDED`` if the budget ran out, or a coordinate is NaN or beyond :attr:`Tree.mode_ranges`: no bound holds.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`collide`; for coordinates of another number than the tree has modes.
+    """
+    found = _core.collide_deformed(a, poses_a, q_a, b, poses_b, q_b, margin, max_level, budget, threads, order)
+    return _VERDICTS[found] if isinstance(found, int) else found
+
+
 def distance_solids(
     a: Tree,
     poses_a: ArrayLike,

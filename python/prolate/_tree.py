@@ -13,7 +13,7 @@ from ._mesh import Mesh, arrays_of, placed
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 Progress = Optional[Callable[[str, float, int], object]]
 
@@ -182,6 +182,47 @@ class Tree(_core.Tree):
         report = _core.verify(self, vertices, triangles, None, threads, progress)
         report["levels"] = tuple(LevelProof(**level) for level in report["levels"])
         return Proof(**report)
+
+    def with_modes(self, mesh: Any, faces: Any = None, *, modes: ArrayLike, ranges: ArrayLike) -> Tree:
+        """The same tree with bounds of how its nodes move by modes, proved; :func:`collide_deformed` asks about it.
+
+        At coordinates ``q`` vertex ``v`` is at ``vertices[v] + sum(q[m] * modes[m, v])``, and the nodes hold the mesh
+        for all ``q`` with ``abs(q) <= ranges``. Other queries answer for the mesh at rest.
+
+        Parameters
+        ----------
+        mesh, faces
+            What the tree was baked from, as for :meth:`verify`.
+        modes : array (M, V, 3)
+            Displacements of the vertices by a unit of each of at most 64 modes, in the unit of the vertices. Rounded to
+            float32. Vertices in one place must move alike.
+        ranges : array (M,)
+            Largest absolute values of the coordinates, above 0.
+
+        Raises
+        ------
+        Error, ValueError, TypeError
+            For modes of another number of vertices, or not finite; for another mesh; for ranges in which a node would
+            grow a thousandfold; for a tree that has modes already, and one of a filled mesh.
+        """
+        import numpy as np
+
+        displacements = np.asarray(modes, dtype=float)
+        if isinstance(mesh, Mesh):
+            vertices, triangles, placement = mesh.vertices, mesh.faces, (mesh.scale, mesh.origin)
+        else:
+            vertices, triangles = (mesh, faces) if faces is not None else arrays_of(mesh)
+            known = self.info_dict()
+            origin = known["origin"] if any(known["origin"]) else False
+            vertices, triangles, placement = placed(vertices, triangles, known["scale"], origin)
+            if displacements.ndim == 3 and displacements.shape[2] == 3:
+                displacements = displacements * np.asarray(known["scale"])
+        return Tree(_core.add_modes(self, vertices, triangles, placement, displacements, ranges))
+
+    @property
+    def mode_ranges(self) -> NDArray[np.float32]:
+        """How large the coordinates of :func:`collide_deformed` may be, one for each mode; empty without modes."""
+        return self.mode_range_array()
 
     # ---- pictures and exports, by the command that comes with the package ----
 

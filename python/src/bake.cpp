@@ -3,6 +3,7 @@
 #include "python/src/tree.hpp"
 
 #include <prolate/build.hpp>
+#include <prolate/modes.hpp>
 #include <prolate/verify.hpp>
 
 #include <chrono>
@@ -257,6 +258,28 @@ nb::tuple bake(nb::handle vertices, nb::handle faces, nb::handle placement, cons
     return nb::make_tuple(owned_bytes(built->tree.bytes()), report);
 }
 
+// Bytes of the tree with its deformation. `modes` and `ranges` are float32, contiguous.
+nb::object add_modes_to(nb::handle tree, nb::handle vertices, nb::handle faces, nb::handle placement, nb::handle modes,
+                        nb::handle ranges) {
+    const HeldTree& held = tree_of(tree, "tree");
+    const TakenMesh mesh = take_mesh(vertices, faces, placement);
+    const nb::object keep[2] = {as_numpy(modes, "modes", "float32"), as_numpy(ranges, "ranges", "float32")};
+    const AnyArray of_modes = import_array(keep[0]), of_ranges = import_array(keep[1]);
+    if (of_modes.ndim() != 3 || of_modes.shape(1) != mesh.view.vertices.size() || of_modes.shape(2) != 3)
+        value_error("modes", "must have shape (M, " + std::to_string(mesh.view.vertices.size()) + ", 3), not " +
+                                 of_modes.shape_text());
+    if (of_ranges.ndim() != 1 || of_ranges.shape(0) != of_modes.shape(0))
+        value_error("ranges",
+                    "must have shape (" + std::to_string(of_modes.shape(0)) + ",), not " + of_ranges.shape_text());
+    const Modes given{{static_cast<const float*>(of_modes.data()), of_modes.size()},
+                      {static_cast<const float*>(of_ranges.data()), of_ranges.size()}};
+    Progress progress;
+    const auto added = progress.run(nb::none(), [&] { return add_modes(held.view, mesh.view, given); });
+    if (!added && added.error().code == ErrorCode::bad_options) throw nb::value_error(added.error().what);
+    if (!added) throw Failure{added.error(), "index " + std::to_string(added.error().where)};
+    return owned_bytes(added->bytes());
+}
+
 // (source hash, options hash), the key of a cache.
 nb::tuple bake_key(nb::handle vertices, nb::handle faces, nb::handle placement, const nb::dict& options) {
     const BuildOptions wanted = options_of(options);
@@ -357,6 +380,8 @@ nb::object file_hash(const nb::bytes& name, nb::handle unit, nb::handle scale, n
 void bind_bake(nb::module_& m) {
     m.def("bake", &bake, nb::arg("vertices").none(), nb::arg("faces").none(), nb::arg("placement").none(),
           nb::arg("options"), nb::arg("progress").none());
+    m.def("add_modes", &add_modes_to, nb::arg("tree").none(), nb::arg("vertices").none(), nb::arg("faces").none(),
+          nb::arg("placement").none(), nb::arg("modes").none(), nb::arg("ranges").none());
     m.def("options_hash", [](const nb::dict& options) { return hash(options_of(options)); });
     m.def("bake_key", &bake_key, nb::arg("vertices").none(), nb::arg("faces").none(), nb::arg("placement").none(),
           nb::arg("options"));

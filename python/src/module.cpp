@@ -64,6 +64,7 @@ NB_MODULE(_core, m) {
     python::bind_bake(m);
     python::bind_queries(m);
     python::bind_contacts(m);
+    python::bind_deform(m);
     python::bind_points(m);
     python::bind_primitives(m);
     python::bind_pairs(m);

@@ -29,6 +29,7 @@ void bind_tree(nb::module_& m);
 void bind_bake(nb::module_& m);
 void bind_queries(nb::module_& m);
 void bind_contacts(nb::module_& m);
+void bind_deform(nb::module_& m);
 void bind_points(nb::module_& m);
 void bind_primitives(nb::module_& m);
 void bind_pairs(nb::module_& m);

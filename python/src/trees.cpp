@@ -239,6 +239,13 @@ void bind_tree(nb::module_& m) {
                  const size_t begin = static_cast<size_t>(inner->bytes().data() - self.view.bytes().data());
                  return nb::make_tuple(begin, begin + inner->bytes().size());
              })
+        .def("mode_range_array",
+             [](const HeldTree& self) { // float32 (M,), M = 0 without a deformation
+                 std::vector<float> ranges;
+                 if (const auto modes = self.view.deformation())
+                     for (uint32_t m = 0; m < modes->mode_count(); ++m) ranges.push_back(modes->range(m));
+                 return to_numpy(ranges, {ranges.size()});
+             })
         .def("info_dict", &info_of)
         .def("cut_arrays", &cut, nb::arg("level").none())
         .def("mesh_arrays", &mesh_of);

@@ -129,6 +129,23 @@ static void test_pairs(void) {
     CHECK(s.verdict == PROLATE_OVERLAPPING && fabs(s.time_upper - 0.5) < 1e-3);
 }
 
+static void test_deformed(void) { /* deform_test.cpp asks about trees that have modes */
+    prolate_deformed_result result = PROLATE_INIT(prolate_deformed_result);
+    prolate_deformed_body still = {at(&box, 0, 0, 0), NULL, 0}, near_by = {at(&box, 0.5f, 0, 0), NULL, 0},
+                          far_off = {at(&box, 3, 0, 0), NULL, 0};
+    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &result));
+    CHECK(result.verdict == PROLATE_SEPARATED && result.reason == PROLATE_DECIDED);
+    CHECK_OK(prolate_collide_deformed(still, near_by, scratch, scratch_size, NULL, &result));
+    CHECK(result.verdict == PROLATE_OVERLAPPING && !result.enclosed);
+    const float q[1] = {0};
+    still.q = q, still.q_count = 1; /* the tree has no modes */
+    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &result));
+    CHECK(result.verdict == PROLATE_UNDECIDED && result.reason == PROLATE_UNDECIDED_COORDINATES);
+    still.q = NULL;
+    CHECK_STATUS(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &result), PROLATE_BAD_ARGUMENT);
+    CHECK(prolate_mode_count(&box) == 0 && prolate_mode_range(&box, 0) == 0 && prolate_mode_count(NULL) == 0);
+}
+
 static void test_solids(void) {
     prolate_tree coarser, inner;
     CHECK_OK(prolate_tree_coarser(&box, 0, &coarser));
@@ -528,6 +545,7 @@ int main(void) {
     scratch = aligned_alloc(64, scratch_size);
     test_trees();
     test_pairs();
+    test_deformed();
     test_solids();
     test_one_body();
     test_scaled_and_shapes();

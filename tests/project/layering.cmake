@@ -11,7 +11,7 @@ cmake_minimum_required(VERSION 3.25)
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
 set(layers include/prolate src query builder capi viewer cli python)
-set(core_headers "types|error|mass|primitives|bake_info|detail/tree_bytes|tree|matrix|version")
+set(core_headers "types|error|mass|primitives|bake_info|deformation|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
 set(include/prolate_headers ".*")
@@ -22,7 +22,7 @@ set(src_headers "${core_headers}")
 set(src_folders "src")
 set(src_libraries "xxhash\\.h|${posix}")
 
-set(query_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|poses|bounds|jobs|solids|world|world_queries|tools|glm")
+set(query_headers "${core_headers}|query|collide|deform|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|poses|bounds|jobs|solids|world|world_queries|tools|glm")
 set(query_folders "src|query")
 set(query_libraries "glm/.*|hwy/.*")
 # Inside query/: each folder may include itself and these, so queries do not know each other.
@@ -37,14 +37,15 @@ foreach(folder collide distance sweep raycast shapes points)
 endforeach()
 set(query/half_space_knows "${query_geometry} collide contacts distance shapes sweep")
 set(query/solids_knows "${query_geometry} collide distance")
+set(query/deform_knows "${query_geometry} raycast")
 set(query/contacts_knows "${query_geometry} collide")
 set(query/world_knows "${query_geometry} collide contacts distance sweep raycast shapes")
 
-set(builder_headers "${core_headers}|mesh|build|verify")
+set(builder_headers "${core_headers}|mesh|build|verify|modes")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
-set(capi_headers "${core_headers}|query|collide|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|bounds|poses|jobs|solids|world|world_queries")
+set(capi_headers "${core_headers}|query|collide|deform|distance|contacts|sweep|raycast|shapes|half_space|points|pairs|bounds|poses|jobs|solids|world|world_queries")
 set(capi_folders "capi")
 set(capi_libraries "prolate/prolate\\.h")
 
@@ -69,6 +70,7 @@ set(extra_include/prolate/tbb.hpp "oneapi/tbb/.*")
 set(extra_builder/collada_document.hpp "pugixml\\.hpp")
 set(extra_builder/gltf_document.hpp "nlohmann/.*")
 set(extra_builder/import_3mf.cpp "Model/COM/.*")
+set(extra_cli/bake/modes_file.cpp "minizip/.*")
 set(extra_cli/compare/hull.cpp "libqhull_r/.*")
 
 # allowed(OUT file layer form target): may `file` of `layer` include <target> (form "<") or "target" (form ")?

@@ -4,6 +4,7 @@
 #include <prolate/bounds.hpp>
 #include <prolate/collide.hpp>
 #include <prolate/contacts.hpp>
+#include <prolate/deform.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/half_space.hpp>
 #include <prolate/jobs.hpp>
@@ -35,6 +36,10 @@ int main(int argc, char** argv) {
     const auto row = [](const char* header, bool right) { std::printf("%s%s\n", header, right ? "" : ": wrong"); };
 
     row("collide.hpp", collide(tree, here, tree, near, context).verdict == Verdict::overlapping);
+
+    const DeformedBody at_rest{tree};
+    row("deform.hpp", collide(at_rest, {tree, near}, context).verdict == Verdict::overlapping &&
+                          collide(at_rest, {tree, far}, context).verdict == Verdict::separated);
 
     const DistanceResult d = distance(tree, here, tree, far, context);
     row("distance.hpp", d.lower > 1 && d.lower <= d.upper && d.upper < 10);

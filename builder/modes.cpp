@@ -1,0 +1,183 @@
+// add_modes(): for each node and mode, the ball around all U(x) as seen from the node as the unit ball: its center is
+// the shift, its radius the growth. (The center by the iteration of Badoiu and Clarkson, "Smaller core-sets for balls",
+// SODA 2003: an inexact one costs tightness only.) Shifts are rounded first, and growths measured from the rounded
+// ones.
+#include <prolate/modes.hpp>
+
+#include "builder/fit.hpp"
+#include "builder/moving_mesh.hpp"
+#include "src/bytes.hpp"
+#include "src/deformation.hpp"
+#include "src/format.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <new>
+#include <utility>
+#include <vector>
+
+namespace prolate {
+namespace {
+
+constexpr int kBallSteps = 24;
+// Growths are this much larger than measured, relatively, and by this share of |L^-1| times the lengths that enter:
+// more than the inverse of a factor is wrong by (axis ratios reach 2^14), and far more than verify_modes() asks for.
+constexpr double kGrowthMargin = 1e-9, kInverseMargin = 1e-10;
+
+struct NodeMotion {
+    Vec shift = Vec::Zero();
+    double growth = 0;
+};
+
+// The middle of a ball around the points.
+Vec middle_of(std::span<const Vec> points) {
+    Box box;
+    for (const Vec& p : points) box.add(p);
+    Vec middle = box.center();
+    for (int i = 1; i <= kBallSteps; ++i) {
+        const auto nearer = [&](const Vec& p, const Vec& q) {
+            return (p - middle).squaredNorm() < (q - middle).squaredNorm();
+        };
+        middle += (*std::max_element(points.begin(), points.end(), nearer) - middle) / (i + 1);
+    }
+    return middle;
+}
+
+float round_up(double x) {
+    return x > 0 ? std::nextafter(static_cast<float>(x), HUGE_VALF) : 0.0f;
+}
+
+class Motions {
+public:
+    Motions(const TreeView& tree, const MovingMesh& mesh)
+        : tree_(tree), mesh_(mesh), modes_(mesh.mode_count()), all_(size_t{tree.slot_count()} * modes_) {}
+
+    // The content of the section.
+    Result<std::vector<std::byte>> run() {
+        for_each([this](std::span<const Vec> u, const Fit& fit, NodeMotion& motion, uint32_t) {
+            std::vector<Vec> seen;
+            for (const Vec& x : u) seen.emplace_back(fit.inverse * x);
+            motion.shift = fit.factor * middle_of(seen);
+        });
+        find_steps(
+            shift_steps_, [](const NodeMotion& n) { return n.shift.cwiseAbs().maxCoeff(); },
+            std::numeric_limits<int16_t>::max());
+        for_each([this](std::span<const Vec> u, const Fit& fit, NodeMotion& motion, uint32_t m) {
+            for (double& x : motion.shift) x = shift(x, m) * double{shift_steps_[m]};
+            double lengths = motion.shift.norm();
+            for (const Vec& x : u) {
+                motion.growth = std::max(motion.growth, (fit.inverse * (x - motion.shift)).norm());
+                lengths = std::max(lengths, x.norm());
+            }
+            motion.growth += kGrowthMargin * motion.growth + kInverseMargin * fit.inverse.norm() * lengths;
+        });
+        find_steps(
+            growth_steps_, [](const NodeMotion& n) { return n.growth; }, std::numeric_limits<uint16_t>::max());
+        if (const auto sound = check_growth(); !sound) return sound.error();
+        return content();
+    }
+
+private:
+    template <class Visit> void for_each(Visit&& visit) {
+        std::vector<Vec> u;
+        mesh_.for_each_node(tree_, [&](uint32_t node, std::span<const uint32_t> vertices) {
+            if (vertices.empty()) return; // a leaf deep in the solid stands for no surface
+            const Fit fit(tree_.bound(node));
+            for (uint32_t m = 0; m < modes_; ++m) {
+                u.clear();
+                for (const uint32_t v : vertices) u.push_back(to_vec(mesh_.displacement(v, m)));
+                visit(u, fit, all_[size_t{node} * modes_ + m], m);
+            }
+        });
+    }
+
+    // Of each mode, so that `most` of them reach the largest.
+    template <class Of> void find_steps(std::vector<float>& steps, Of&& of, int most) {
+        for (uint32_t m = 0; m < modes_; ++m) {
+            double largest = 0;
+            for (size_t i = m; i < all_.size(); i += modes_) largest = std::max(largest, of(all_[i]));
+            steps.push_back(round_up(largest / most));
+        }
+    }
+    int16_t shift(double x, uint32_t m) const {
+        return shift_steps_[m] > 0 ? static_cast<int16_t>(std::lround(x / double{shift_steps_[m]})) : int16_t{0};
+    }
+
+    Result<void> check_growth() const {
+        for (size_t i = 0; i < all_.size(); i += modes_) {
+            double grown = 0;
+            for (uint32_t m = 0; m < modes_; ++m) grown += all_[i + m].growth * double{mesh_.range(m)};
+            if (!(grown < kMostGrowth))
+                return Error{ErrorCode::bad_options,
+                             "in these ranges a node would grow more than a thousandfold; give smaller ones",
+                             i / modes_};
+        }
+        return {};
+    }
+
+    std::vector<std::byte> content() const {
+        const bool exact = tree_.has_triangles();
+        std::vector<uint32_t> points = exact ? std::vector<uint32_t>(mesh_.vertices().size()) : mesh_.witnesses();
+        if (exact)
+            for (uint32_t v = 0; v < points.size(); ++v) points[v] = v;
+        const auto count = static_cast<uint32_t>(points.size());
+        std::vector<std::byte> out(static_cast<size_t>(deformation_bytes(modes_, tree_.slot_count(), count, exact)));
+        std::byte* to = out.data();
+        const auto put = [&to](auto value) {
+            store_le(to, value);
+            to += sizeof value;
+        };
+        const auto put_point = [&put](const Vec3& p) { put(p.x), put(p.y), put(p.z); };
+        put(modes_), put(count), put(uint64_t{0});
+        for (uint32_t m = 0; m < modes_; ++m) put(mesh_.range(m)), put(shift_steps_[m]), put(growth_steps_[m]);
+        for (size_t i = 0; i < all_.size(); ++i) {
+            const auto m = static_cast<uint32_t>(i % modes_);
+            for (const double x : all_[i].shift) put(shift(x, m));
+            const double step = growth_steps_[m];
+            put(static_cast<uint16_t>(step > 0 ? std::ceil(all_[i].growth / step) : 0));
+        }
+        if (!exact)
+            for (const uint32_t v : points) put_point(mesh_.vertices()[v]);
+        for (const uint32_t v : points)
+            for (uint32_t m = 0; m < modes_; ++m) put_point(mesh_.displacement(v, m));
+        return out;
+    }
+
+    const TreeView& tree_;
+    const MovingMesh& mesh_;
+    const uint32_t modes_;
+    std::vector<NodeMotion> all_; // by slots, then modes
+    std::vector<float> shift_steps_, growth_steps_;
+};
+
+Result<Tree> add(const TreeView& tree, MeshView mesh, const Modes& modes) {
+    if (tree.deformation()) return Error{ErrorCode::unsupported, "the tree has a deformation already; bake it anew", 0};
+    const auto moving = MovingMesh::of(tree, mesh, modes);
+    if (!moving) return moving.error();
+    const auto content = Motions(tree, *moving).run();
+    if (!content) return content.error();
+    std::vector<std::byte> file(tree.bytes().begin(), tree.bytes().end());
+    format::append_section(file, kDeformationKind, *content);
+    auto out = Tree::open(std::move(file));
+    if (!out) return out.error();
+    const auto proof = verify_modes(out->view(), mesh, modes);
+    if (!proof) return proof.error();
+    if (!proof->proved)
+        return Error{ErrorCode::internal, "the bound of a node's motion could not be proved; please report this mesh",
+                     proof->node};
+    return out;
+}
+
+} // namespace
+
+Result<Tree> add_modes(const TreeView& tree, MeshView mesh, const Modes& modes) {
+    try {
+        return add(tree, mesh, modes);
+    } catch (const std::bad_alloc&) {
+        return Error{ErrorCode::out_of_memory, "there is not enough memory", 0};
+    }
+}
+
+} // namespace prolate

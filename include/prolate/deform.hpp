@@ -1,0 +1,70 @@
+// Bodies that deform by modes: do they meet, and where does a ray meet them? deformation.hpp says how they deform.
+//
+// What a deforming body is, at coordinates q:
+//  - its surface: the triangles of its mesh, each with its corners where q moves them, and if the mesh is closed, all
+//    that this surface encloses. An exact tree is asked about these triangles; of a tree without triangles only their
+//    cover is known, the leaf ellipsoids as q moves and enlarges them.
+//  - A tree without deformation (or any tree, with no coordinates) is the rigid body of query.hpp.
+//
+// What is certified:
+//  - separated:   the surfaces do not touch, and neither body holds a part of the other. Of the deformed mesh, whatever
+//                 the tree.
+//  - overlapping: exact trees: two triangles have a common point (or are so close that rounding hides the gap). Else
+//  two
+//                 leaf ellipsoids do, and the surfaces may still be separated. Or, if `enclosed`, the surfaces are
+//                 separated, but none of the rays that were tried leads from a part of one body out of the other: that
+//                 part lies inside, or in a deep hollow.
+//  - undecided:   see Undecided.
+//
+// A query looks at no vertex but the corners of the triangles of exact leaves that it comes down to. It costs what it
+// opens: in double precision, node by node, about 0.2 us for each test and 10 ns more for each mode.
+//
+// TreeView::scaled() scales the displacements, too; TreeView::rounded() rounds the deformed body.
+#pragma once
+
+#include <prolate/collide.hpp>
+#include <prolate/raycast.hpp>
+
+#include <cstdint>
+#include <span>
+
+namespace prolate {
+
+/// A body at a pose, deformed. The coordinates are borrowed. None of them: all are 0.
+struct DeformedBody {
+    TreeView tree;
+    Pose pose = {};
+    std::span<const float> q = {}; ///< as many as the tree's deformation has modes, |q[i]| <= range(i)
+};
+
+/// Why a query of deformed bodies decided nothing.
+enum class Undecided : uint8_t {
+    no,          ///< it did decide
+    coordinates, ///< there are more or fewer than the tree has modes, or one is out of range or NaN: no bound holds
+    input,       ///< a pose or a ray is not finite, or the scratch is too small
+    budget,      ///< options.max_pair_tests ran out
+};
+
+/// Answer of collide() for deformed bodies.
+struct DeformedCollideResult : CollideResult {
+    Undecided reason = Undecided::input;
+};
+
+/// Do two bodies meet, or come within options.margin of each other? Of CollideResult, `pair` names leaves, and their
+/// triangles, that meet; the roots if enclosed. options.max_level is taken as collide() takes it. Swapping the bodies
+/// gives the same verdict but for gaps that rounding hides. Takes as much scratch as collide() of the same trees.
+/// Thread-safe on shared trees.
+DeformedCollideResult collide(const DeformedBody& a, const DeformedBody& b, Scratch context,
+                              const QueryOptions& options = {}) noexcept;
+
+/// Answer of raycast() for deformed bodies.
+struct DeformedRaycastResult : RaycastResult {
+    Undecided reason = Undecided::input;
+};
+
+/// Where does the ray first meet the deformed leaf ellipsoids, or the deformed triangles of an exact tree? As raycast()
+/// of a rigid body. Thread-safe on shared trees.
+DeformedRaycastResult raycast(const DeformedBody& body, const Ray& ray, Scratch context,
+                              const QueryOptions& options = {}) noexcept;
+
+} // namespace prolate

@@ -1,0 +1,59 @@
+// A deformed body's nodes, triangles and points, in its own frame, in double precision.
+//
+// Rounding, in the terms of query/ellipsoid/separation.hpp: u = 2^-53, S = all lengths that enter, |q_i d_i| and the
+// growths among them (`reach`). With M <= kMaxModes = 64 modes, a center c + sum q_i d_i is wrong by at most (M + 1) u
+// S, each product and each sum one rounding, and L (1 + sum |q_i| g_i) by (M + 2) u S; with what both bodies' poses
+// cost, 83 u S, p - a - b is wrong by less than 83 u S + 66 u S, within the 256 u S that is demanded there. Triangles:
+// 91 u S + 65 u S of 256 u S. Rays: 15 + 124 + 66 u S, and 66 u S more where the ray begins at a deformed point; of
+// triangles 352 + 4 * 65 u S. Twice the margins of query/raycast/ray.hpp are taken.
+#pragma once
+
+#include "query/ellipsoid/placed.hpp"
+#include "query/triangle/placed.hpp"
+
+#include <prolate/deform.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace prolate::query {
+
+class Deformed {
+public:
+    /// `body` must outlive it. Nodes from level `max_level` on stand for what is below them.
+    Deformed(const DeformedBody& body, uint32_t max_level) noexcept;
+
+    /// Do the bounds hold for these coordinates?
+    bool in_range() const noexcept { return in_range_; }
+    const TreeView& tree() const noexcept { return body_.tree; }
+    const Pose& pose() const noexcept { return body_.pose; }
+    bool deforms() const noexcept { return modes_.has_value(); }
+    /// What lies inside of the body, beyond its leaf ellipsoids and triangles, belongs to it, too.
+    bool encloses() const noexcept;
+
+    /// What holds all that `node` stands for.
+    PlacedEllipsoid bound(uint32_t node) const noexcept;
+    PlacedTriangle triangle(uint32_t t) const noexcept;
+    /// Does the search end at `node`? Its triangles are none then, if it is not a leaf.
+    bool ends_at(uint32_t node) const noexcept { return node >= limit_from_ || tree().is_leaf(node); }
+    TriangleRange triangles(uint32_t node) const noexcept { return tree().triangles(node); }
+
+    /// One point at least of each connected part of the surface; of a rigid tree without triangles there are none.
+    uint32_t witness_count() const noexcept;
+    PlacedPoint witness(uint32_t w) const noexcept;
+
+private:
+    PlacedPoint moved(const glm::dvec3& at_rest, uint32_t point) const noexcept;
+
+    const DeformedBody& body_;
+    std::optional<Deformation> modes_;
+    bool in_range_ = false;
+    uint32_t limit_from_;
+};
+
+/// From B's frame to A's, as place() of query/ellipsoid/placed.hpp does.
+PlacedEllipsoid place(const PlacedEllipsoid& of_b, const RelativePose& b_to_a) noexcept;
+PlacedTriangle place(const PlacedTriangle& of_b, const RelativePose& b_to_a) noexcept;
+
+} // namespace prolate::query
