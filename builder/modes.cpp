@@ -1,7 +1,7 @@
-// add_modes(): for each node and mode, the ball around all U(x) as seen from the node as the unit ball: its center is
-// the shift, its radius the growth. (The center by the iteration of Badoiu and Clarkson, "Smaller core-sets for balls",
-// SODA 2003: an inexact one costs tightness only.) Shifts are rounded first, and growths measured from the rounded
-// ones.
+// add_modes(): for each node and mode, a ball around all U(x). Its center is the shift, and its radius the radius, or
+// where that is less the growth as seen from the node as the unit ball. (The center by the iteration of Badoiu and
+// Clarkson, "Smaller core-sets for balls", SODA 2003: an inexact one costs tightness only.) Shifts are rounded first,
+// and growths measured from the rounded ones.
 #include <prolate/modes.hpp>
 
 #include "builder/fit.hpp"
@@ -24,11 +24,14 @@ namespace {
 constexpr int kBallSteps = 24;
 // Growths are this much larger than measured, relatively, and by this share of |L^-1| times the lengths that enter:
 // more than the inverse of a factor is wrong by (axis ratios reach 2^14), and far more than verify_modes() asks for.
-constexpr double kGrowthMargin = 1e-9, kInverseMargin = 1e-10;
+constexpr double kMargin = 1e-9, kInverseMargin = 1e-10;
+
+// A growth makes a node larger by less than this factor, or a radius is taken in its place.
+constexpr double kMostOfOneMode = 8;
 
 struct NodeMotion {
     Vec shift = Vec::Zero();
-    double growth = 0;
+    double growth = 0, radius = 0; // one of them is 0
 };
 
 // The middle of a ball around the points.
@@ -66,15 +69,12 @@ public:
             std::numeric_limits<int16_t>::max());
         for_each([this](std::span<const Vec> u, const Fit& fit, NodeMotion& motion, uint32_t m) {
             for (double& x : motion.shift) x = shift(x, m) * double{shift_steps_[m]};
-            double lengths = motion.shift.norm();
-            for (const Vec& x : u) {
-                motion.growth = std::max(motion.growth, (fit.inverse * (x - motion.shift)).norm());
-                lengths = std::max(lengths, x.norm());
-            }
-            motion.growth += kGrowthMargin * motion.growth + kInverseMargin * fit.inverse.norm() * lengths;
+            measure(u, fit, motion, mesh_.range(m));
         });
         find_steps(
-            growth_steps_, [](const NodeMotion& n) { return n.growth; }, std::numeric_limits<uint16_t>::max());
+            growth_steps_, [](const NodeMotion& n) { return n.growth; }, kMostSteps);
+        find_steps(
+            radius_steps_, [](const NodeMotion& n) { return n.radius; }, kMostSteps);
         if (const auto sound = check_growth(); !sound) return sound.error();
         return content();
     }
@@ -93,6 +93,21 @@ private:
         });
     }
 
+    // Growth or radius: what adds less to the mean extent, of which a ball's is its radius, and an ellipsoid's at most
+    // |L| / sqrt(3).
+    static void measure(std::span<const Vec> u, const Fit& fit, NodeMotion& motion, double range) {
+        double growth = 0, radius = 0, lengths = motion.shift.norm();
+        for (const Vec& x : u) {
+            growth = std::max(growth, (fit.inverse * (x - motion.shift)).norm());
+            radius = std::max(radius, (x - motion.shift).norm());
+            lengths = std::max(lengths, x.norm());
+        }
+        growth += kMargin * growth + kInverseMargin * fit.inverse.norm() * lengths;
+        radius += kMargin * radius;
+        const bool grows = growth * fit.factor.norm() < std::sqrt(3.0) * radius && growth * range < kMostOfOneMode;
+        (grows ? motion.growth : motion.radius) = grows ? growth : radius;
+    }
+
     // Of each mode, so that `most` of them reach the largest.
     template <class Of> void find_steps(std::vector<float>& steps, Of&& of, int most) {
         for (uint32_t m = 0; m < modes_; ++m) {
@@ -105,16 +120,15 @@ private:
         return shift_steps_[m] > 0 ? static_cast<int16_t>(std::lround(x / double{shift_steps_[m]})) : int16_t{0};
     }
 
+    // Of the root.
     Result<void> check_growth() const {
-        for (size_t i = 0; i < all_.size(); i += modes_) {
-            double grown = 0;
-            for (uint32_t m = 0; m < modes_; ++m) grown += all_[i + m].growth * double{mesh_.range(m)};
-            if (!(grown < kMostGrowth))
-                return Error{ErrorCode::bad_options,
-                             "in these ranges a node would grow more than a thousandfold; give smaller ones",
-                             i / modes_};
-        }
-        return {};
+        const double size = Fit(tree_.root_bound()).factor.norm();
+        double grown = 0;
+        for (uint32_t m = 0; m < modes_; ++m)
+            grown += (all_[m].growth + all_[m].radius / size) * double{mesh_.range(m)};
+        if (grown < kMostGrowth) return {};
+        return Error{ErrorCode::bad_options,
+                     "in these ranges the body would grow more than a thousandfold; give smaller ones", 0};
     }
 
     std::vector<std::byte> content() const {
@@ -131,12 +145,16 @@ private:
         };
         const auto put_point = [&put](const Vec3& p) { put(p.x), put(p.y), put(p.z); };
         put(modes_), put(count), put(uint64_t{0});
-        for (uint32_t m = 0; m < modes_; ++m) put(mesh_.range(m)), put(shift_steps_[m]), put(growth_steps_[m]);
+        for (uint32_t m = 0; m < modes_; ++m)
+            put(mesh_.range(m)), put(shift_steps_[m]), put(growth_steps_[m]), put(radius_steps_[m]);
         for (size_t i = 0; i < all_.size(); ++i) {
             const auto m = static_cast<uint32_t>(i % modes_);
             for (const double x : all_[i].shift) put(shift(x, m));
-            const double step = growth_steps_[m];
-            put(static_cast<uint16_t>(step > 0 ? std::ceil(all_[i].growth / step) : 0));
+            const bool is_radius = all_[i].radius > 0;
+            const double step = is_radius ? radius_steps_[m] : growth_steps_[m];
+            const double size = is_radius ? all_[i].radius : all_[i].growth;
+            const auto steps = static_cast<uint16_t>(step > 0 ? std::ceil(size / step) : 0);
+            put(static_cast<uint16_t>(is_radius ? steps | kIsRadius : steps));
         }
         if (!exact)
             for (const uint32_t v : points) put_point(mesh_.vertices()[v]);
@@ -149,7 +167,7 @@ private:
     const MovingMesh& mesh_;
     const uint32_t modes_;
     std::vector<NodeMotion> all_; // by slots, then modes
-    std::vector<float> shift_steps_, growth_steps_;
+    std::vector<float> shift_steps_, growth_steps_, radius_steps_;
 };
 
 Result<Tree> add(const TreeView& tree, MeshView mesh, const Modes& modes) {

@@ -53,8 +53,9 @@ Result<ModesProof> prove(const TreeView& tree, MeshView mesh, const Modes& modes
             const Deformation::Motion motion = stored->motion(node, m);
             const Vec shift(motion.shift[0], motion.shift[1], motion.shift[2]);
             for (const uint32_t v : vertices) {
-                const double length = solve(bound, to_vec(moving->displacement(v, m)) - shift).norm();
-                if (length * (1 + kSolving) <= motion.growth) continue;
+                const Vec rest = to_vec(moving->displacement(v, m)) - shift;
+                if (rest.norm() * (1 + kSolving) <= motion.radius) continue;
+                if (solve(bound, rest).norm() * (1 + kSolving) <= motion.growth) continue;
                 if (proof.proved) proof = {.proved = false, .node = node, .mode = m};
             }
         }

@@ -24,14 +24,18 @@ Result<void> check_rows(std::span<const std::byte> content, uint32_t modes) {
         const size_t at = kModeRows + size_t{m} * kModeRowBytes;
         const std::byte* const row = content.data() + at;
         const float range = load_le<float>(row + kModeRange), shift = load_le<float>(row + kShiftStep),
-                    growth = load_le<float>(row + kGrowthStep);
+                    growth = load_le<float>(row + kGrowthStep), radius = load_le<float>(row + kRadiusStep);
         if (!(range > 0 && range <= std::numeric_limits<float>::max()))
             return bad("the range of a mode is not above 0 and finite", at + kModeRange);
-        if (!(shift >= 0 && double{range} * shift * std::numeric_limits<int16_t>::max() <= double{kLargestCoordinate}))
+        // Rounded up by half.
+        const auto within = [range](float step, double most) {
+            return step >= 0 && double{range} * step * kMostSteps <= 1.5 * most;
+        };
+        if (!within(shift, double{kLargestCoordinate}))
             return bad("the step of a mode's shifts is out of range", at + kShiftStep);
-        // Each mode by itself, rounded up by half: growths of other nodes need not reach so far.
-        if (!(growth >= 0 && double{range} * growth * std::numeric_limits<uint16_t>::max() <= 1.5 * kMostGrowth))
-            return bad("the step of a mode's growths is out of range", at + kGrowthStep);
+        if (!within(growth, kMostGrowth)) return bad("the step of a mode's growths is out of range", at + kGrowthStep);
+        if (!within(radius, double{kLargestCoordinate}))
+            return bad("the step of a mode's radii is out of range", at + kRadiusStep);
     }
     return {};
 }
@@ -60,7 +64,11 @@ Deformation::Motion Deformation::motion(uint32_t slot, uint32_t mode) const noex
     const double step = load_le<float>(row + kShiftStep);
     Motion out{};
     for (size_t i = 0; i < 3; ++i) out.shift[i] = load_le<int16_t>(at + kShift + 2 * i) * step;
-    out.growth = load_le<uint16_t>(at + kGrowth) * double{load_le<float>(row + kGrowthStep)};
+    const auto steps = load_le<uint16_t>(at + kGrowth);
+    if ((steps & kIsRadius) != 0)
+        out.radius = (steps & kMostSteps) * double{load_le<float>(row + kRadiusStep)};
+    else
+        out.growth = steps * double{load_le<float>(row + kGrowthStep)};
     return out;
 }
 

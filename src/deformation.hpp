@@ -18,14 +18,15 @@ enum DeformationOffset : size_t {
     kModeZeros = 8,
     kModeRows = 16, // of kModeRowBytes each
 };
-// Of a mode's row: range, then the steps of shifts and growths, floats.
-enum ModeRowOffset : size_t { kModeRange = 0, kShiftStep = 4, kGrowthStep = 8, kModeRowBytes = 12 };
-// Of a node and a mode: three int16 and a uint16, in these steps.
+// Of a mode's row: range, then the steps of shifts, growths and radii, floats.
+enum ModeRowOffset : size_t { kModeRange = 0, kShiftStep = 4, kGrowthStep = 8, kRadiusStep = 12, kModeRowBytes = 16 };
+// Of a node and a mode, in these steps: three int16, and a uint16, a growth, or with the highest bit a radius.
 enum MotionOffset : size_t { kShift = 0, kGrowth = 6, kMotionBytes = 8 };
+inline constexpr uint16_t kIsRadius = 0x8000, kMostSteps = 0x7fff;
 inline constexpr size_t kPointBytes = 12;
 
-/// A node at the ends of its coordinates' ranges is larger by no more than this factor: with more, modes and ranges
-/// make no sense, and a sum of growths might not be finite.
+/// At the ends of its coordinates' ranges, the root is larger by no more than this factor: with more, modes and ranges
+/// make no sense. Nor does any node grow by more in one mode, so that all sums are finite.
 inline constexpr double kMostGrowth = 1024;
 
 /// Where the nodes' motions begin, the points, and their displacements.

@@ -5,10 +5,11 @@
 // coordinates, |q_i| <= range(i). Modes are those of a simulation, or blend shapes.
 //
 // A node stands for all triangles that meet the leaf ellipsoids below it (of exact trees: the triangles below it). For
-// each mode it has a shift d_i and a growth g_i >= |L^-1 (U_i(x) - d_i)| for every corner x of these, L the factor of
-// TreeView::bound(). So for all coordinates in range, the ellipsoid {c + sum q_i d_i + (1 + sum |q_i| g_i) L u} holds
-// what the node stands for, wherever it has moved: a point c + L v moves to c + L v + sum q_i (d_i + L w_i), |w_i| <=
-// g_i. No vertex need be looked at.
+// each mode it has a shift d_i, and either a growth g_i >= |L^-1 (U_i(x) - d_i)| for every corner x of these, L the
+// factor of TreeView::bound(), or a radius r_i >= |U_i(x) - d_i|: what enlarges the node less, a radius where it is
+// flat. So for all coordinates in range, all points within sum |q_i| r_i of the ellipsoid {c + sum q_i d_i + (1 + sum
+// |q_i| g_i) L u : |u| <= 1} hold what the node stands for, wherever it has moved: a point c + L v moves to c + L v +
+// sum q_i (d_i + L w_i), |w_i| <= g_i, or c + L v + sum q_i (d_i + w_i), |w_i| <= r_i. No vertex need be looked at.
 //
 // The idea is that of D. L. James, D. K. Pai, "BD-Tree: Output-Sensitive Collision Detection for Reduced Deformable
 // Models", ACM Transactions on Graphics 23 (SIGGRAPH), 2004, whose nodes are spheres.
@@ -28,11 +29,11 @@ inline constexpr uint32_t kMaxModes = 64; ///< most modes of a tree
 /// between threads.
 class Deformation {
 public:
-    /// What a unit of a mode does to a node's bound: by how much the center moves, metres, and by which share of itself
-    /// the ellipsoid grows, at least 0.
+    /// What a unit of a mode does to a node's bound.
     struct Motion {
-        double shift[3];
-        double growth;
+        double shift[3]; ///< of the center, metres
+        double growth;   ///< share of itself by which the ellipsoid grows, at least 0
+        double radius;   ///< and how far from it points may be, metres, at least 0
     };
 
     uint32_t mode_count() const noexcept; ///< 1 ... kMaxModes

@@ -27,16 +27,16 @@ struct ModesProof {
 /// The same tree with its deformation, proved as verify_modes() does. `mesh` is what `tree` was baked from. Vertices in
 /// one place must have the same displacements. Cost: as many passes over the vertices as the tree has levels, a second
 /// for a million vertices and modes. The same bytes everywhere. Fails with bad_options for no mode or more than
-/// kMaxModes, a range that is not above 0 and finite, or ranges in which a node would grow a thousandfold; with
+/// kMaxModes, a range that is not above 0 and finite, or ranges in which the body would grow a thousandfold; with
 /// bad_mesh for another mesh, displacements of another count or not finite (`where` is the vertex), or vertices in one
 /// place that move apart (likewise); with unsupported for a prefix, a tree that has a deformation, one of a filled
 /// mesh, and a mesh of which welding moved vertices; with out_of_memory. Thread-safe.
 Result<Tree> add_modes(const TreeView& tree, MeshView mesh, const Modes& modes);
 
 /// Proves a tree's deformation from its bytes, the mesh and the modes: that for every corner x of every triangle that a
-/// node stands for, and every mode, |L^-1 (U(x) - d)| <= g, as all of these decode; and that stored displacements are
-/// those of the modes. That the tree covers at rest is for verify() to prove. Fails as add_modes() does, and with
-/// bad_options for other ranges. Thread-safe.
+/// node stands for, and every mode, |L^-1 (U(x) - d)| <= g or |U(x) - d| <= r, as all of these decode; and that stored
+/// displacements are those of the modes. That the tree covers at rest is for verify() to prove. Fails as add_modes()
+/// does, and with bad_options for other ranges. Thread-safe.
 Result<ModesProof> verify_modes(const TreeView& tree, MeshView mesh, const Modes& modes);
 
 } // namespace prolate

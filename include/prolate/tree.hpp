@@ -112,8 +112,8 @@ public:
     /// about as long as one ellipsoid takes to decode.
     std::optional<TreeView> inner() const noexcept;
 
-    /// How the mesh deforms by modes, and what that does to the nodes, if the file says it: deform.hpp asks about bodies
-    /// that deform. All other queries answer for the body at rest. Lengths are as stored, before scaled().
+    /// How the mesh deforms by modes, and what that does to the nodes, if the file says it: deform.hpp asks about
+    /// bodies that deform. All other queries answer for the body at rest. Lengths are as stored, before scaled().
     std::optional<Deformation> deformation() const noexcept;
 
     /// Version of the format that the bytes are in.

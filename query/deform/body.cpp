@@ -18,22 +18,23 @@ bool Deformed::encloses() const noexcept {
     return !tree().surface_mode() && (modes_.has_value() || tree().has_triangles());
 }
 
-PlacedEllipsoid Deformed::bound(uint32_t node) const noexcept {
+Bound Deformed::bound(uint32_t node) const noexcept {
     const double scale = tree().scale();
-    PlacedEllipsoid out = place(tree().bound(node), scale);
+    Bound out{place(tree().bound(node), scale), 0};
     double moved = 0, grown = 1;
     for (uint32_t m = 0; m < body_.q.size(); ++m) {
         const double q = body_.q[m];
         if (q == 0) continue;
         const Deformation::Motion motion = modes_->motion(node, m);
         const glm::dvec3 shift = scale * q * glm::dvec3(motion.shift[0], motion.shift[1], motion.shift[2]);
-        out.center += shift;
+        out.core.center += shift;
         moved += glm::length(shift);
         grown += std::abs(q) * motion.growth;
+        out.radius += scale * std::abs(q) * motion.radius;
     }
-    out.factor *= grown;
-    out.reach += moved + (grown - 1) * out.size;
-    out.size *= grown;
+    out.core.factor *= grown;
+    out.core.reach += moved + (grown - 1) * out.core.size + out.radius;
+    out.core.size *= grown;
     return out;
 }
 
@@ -70,11 +71,11 @@ PlacedPoint Deformed::witness(uint32_t w) const noexcept {
     return moved(to_double(modes_->point(w)) * double{tree().scale()}, w);
 }
 
-PlacedEllipsoid place(const PlacedEllipsoid& of_b, const RelativePose& b_to_a) noexcept {
-    PlacedEllipsoid out = of_b;
-    out.reach += b_to_a.distance;
-    out.center = b_to_a.rotation * out.center + b_to_a.translation;
-    out.factor = b_to_a.rotation * out.factor;
+Bound place(const Bound& of_b, const RelativePose& b_to_a) noexcept {
+    Bound out = of_b;
+    out.core.reach += b_to_a.distance;
+    out.core.center = b_to_a.rotation * out.core.center + b_to_a.translation;
+    out.core.factor = b_to_a.rotation * out.core.factor;
     return out;
 }
 

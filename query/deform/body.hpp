@@ -1,11 +1,11 @@
 // A deformed body's nodes, triangles and points, in its own frame, in double precision.
 //
 // Rounding, in the terms of query/ellipsoid/separation.hpp: u = 2^-53, S = all lengths that enter, |q_i d_i| and the
-// growths among them (`reach`). With M <= kMaxModes = 64 modes, a center c + sum q_i d_i is wrong by at most (M + 1) u
-// S, each product and each sum one rounding, and L (1 + sum |q_i| g_i) by (M + 2) u S; with what both bodies' poses
-// cost, 83 u S, p - a - b is wrong by less than 83 u S + 66 u S, within the 256 u S that is demanded there. Triangles:
-// 91 u S + 65 u S of 256 u S. Rays: 15 + 124 + 66 u S, and 66 u S more where the ray begins at a deformed point; of
-// triangles 352 + 4 * 65 u S. Twice the margins of query/raycast/ray.hpp are taken.
+// growths and radii among them (`reach`). With M <= kMaxModes = 64 modes, a center c + sum q_i d_i is wrong by at most
+// (M + 1) u S, each product and each sum one rounding, and L (1 + sum |q_i| g_i) by (M + 2) u S; with what both bodies'
+// poses cost, 83 u S, p - a - b is wrong by less than 83 u S + 66 u S, within the 256 u S that is demanded there.
+// Triangles: 91 u S + 65 u S of 256 u S. Rays: 15 + 124 + 66 u S, and 66 u S more where the ray begins at a deformed
+// point; of triangles 352 + 4 * 65 u S. Twice the margins of query/raycast/ray.hpp are taken.
 #pragma once
 
 #include "query/ellipsoid/placed.hpp"
@@ -18,6 +18,12 @@
 #include <span>
 
 namespace prolate::query {
+
+/// All points within `radius` of an ellipsoid. The ellipsoid's reach counts it.
+struct Bound {
+    PlacedEllipsoid core;
+    double radius;
+};
 
 class Deformed {
 public:
@@ -33,7 +39,7 @@ public:
     bool encloses() const noexcept;
 
     /// What holds all that `node` stands for.
-    PlacedEllipsoid bound(uint32_t node) const noexcept;
+    Bound bound(uint32_t node) const noexcept;
     PlacedTriangle triangle(uint32_t t) const noexcept;
     /// Does the search end at `node`? Its triangles are none then, if it is not a leaf.
     bool ends_at(uint32_t node) const noexcept { return node >= limit_from_ || tree().is_leaf(node); }
@@ -53,7 +59,7 @@ private:
 };
 
 /// From B's frame to A's, as place() of query/ellipsoid/placed.hpp does.
-PlacedEllipsoid place(const PlacedEllipsoid& of_b, const RelativePose& b_to_a) noexcept;
+Bound place(const Bound& of_b, const RelativePose& b_to_a) noexcept;
 PlacedTriangle place(const PlacedTriangle& of_b, const RelativePose& b_to_a) noexcept;
 
 } // namespace prolate::query

@@ -19,7 +19,7 @@
 namespace prolate {
 namespace {
 
-using query::Deformed, query::PlacedEllipsoid, query::PlacedTriangle, query::RelativePose;
+using query::Bound, query::Deformed, query::PlacedTriangle, query::RelativePose;
 
 class Collision {
 public:
@@ -30,7 +30,7 @@ public:
     // Of the surfaces alone.
     Verdict surfaces() {
         if (!spend(result.stats.pair_tests)) return Verdict::undecided;
-        const PlacedEllipsoid root_a = a_.bound(0), root_b = in_a(0);
+        const Bound root_a = a_.bound(0), root_b = in_a(0);
         if (apart(root_a, root_b)) return Verdict::separated;
         roots_meet = true;
         uint32_t size = 0;
@@ -52,8 +52,10 @@ public:
     bool roots_meet = false;
 
 private:
-    PlacedEllipsoid in_a(uint32_t node_b) const { return query::place(b_.bound(node_b), b_to_a_); }
-    bool apart(const PlacedEllipsoid& x, const PlacedEllipsoid& y) const { return query::separated(x, y, margin_); }
+    Bound in_a(uint32_t node_b) const { return query::place(b_.bound(node_b), b_to_a_); }
+    bool apart(const Bound& x, const Bound& y) const {
+        return query::separated(x.core, y.core, margin_ + x.radius + y.radius);
+    }
 
     // Counts one test; false if there is none left.
     bool spend(uint64_t& counter) {
@@ -64,8 +66,8 @@ private:
 
     // Puts the children of the larger node, each with the other node, on the stack, if they are not apart.
     void open(const Scratch::Entry& pair, bool end_a, bool end_b, uint32_t& size) {
-        const PlacedEllipsoid of_a = a_.bound(pair.node_a), of_b = in_a(pair.node_b);
-        const bool open_a = !end_a && (end_b || of_a.size >= of_b.size);
+        const Bound of_a = a_.bound(pair.node_a), of_b = in_a(pair.node_b);
+        const bool open_a = !end_a && (end_b || of_a.core.size + of_a.radius >= of_b.core.size + of_b.radius);
         const Deformed& side = open_a ? a_ : b_;
         const ChildRange children = side.tree().children(open_a ? pair.node_a : pair.node_b);
         result.stats.deepest_level = std::max(result.stats.deepest_level, side.tree().level_of(children.first));
@@ -85,7 +87,7 @@ private:
         };
         if (of_a.count == 0 && of_b.count == 0) return take(kNoTriangle, kNoTriangle);
         if (of_a.count == 0 || of_b.count == 0) {
-            const PlacedEllipsoid other = of_a.count == 0 ? a_.bound(node_a) : in_a(node_b);
+            const Bound other = of_a.count == 0 ? a_.bound(node_a) : in_a(node_b);
             const TriangleRange& some = of_a.count == 0 ? of_b : of_a;
             for (uint32_t t = some.first; t < some.first + some.count; ++t) {
                 if (!spend(result.stats.triangle_tests)) return false;
@@ -103,9 +105,10 @@ private:
         }
         return false;
     }
-    bool apart(const PlacedTriangle& triangle, const PlacedEllipsoid& ellipsoid) const {
-        return margin_ > 0 ? query::distance(triangle, ellipsoid).lower > margin_
-                           : query::separated(triangle, ellipsoid);
+    bool apart(const PlacedTriangle& triangle, const Bound& bound) const {
+        const double within = margin_ + bound.radius;
+        return within > 0 ? query::distance(triangle, bound.core).lower > within
+                          : query::separated(triangle, bound.core);
     }
 
     const Deformed &a_, &b_;

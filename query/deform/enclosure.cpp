@@ -46,7 +46,7 @@ private:
             add(search.stats, stats_);
             return finished && !search.found;
         };
-        if (escapes(glm::normalize(origin - root_.center))) return Enclosure::none;
+        if (escapes(glm::normalize(origin - root_.core.center))) return Enclosure::none;
         for (int i = 0; i < 27; ++i) {
             const dvec3 direction(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
             if (direction == dvec3(0) || std::abs(direction.x) + std::abs(direction.y) + std::abs(direction.z) == 2)
@@ -66,10 +66,10 @@ private:
             const uint32_t node = stack_[--size].node_a;
             if (stats_.tests() >= most_tests_) return Enclosure::out_of_tests;
             ++stats_.pair_tests;
-            const PlacedEllipsoid bound = inner_.bound(node);
-            if (separated(root_, place(bound, inner_to_outer_))) continue;
+            const Bound bound = inner_.bound(node);
+            if (separated(root_.core, place(bound, inner_to_outer_).core, root_.radius + bound.radius)) continue;
             if (inner_.tree().is_leaf(node)) {
-                if (const Enclosure e = look_at({bound.center, bound.reach}); e != Enclosure::none) return e;
+                if (const Enclosure e = look_at({bound.core.center, bound.core.reach}); e != Enclosure::none) return e;
                 continue;
             }
             const ChildRange children = inner_.tree().children(node);
@@ -83,7 +83,7 @@ private:
     Scratch::Entry* const stack_;
     const uint64_t most_tests_;
     QueryStats& stats_;
-    const PlacedEllipsoid root_;
+    const Bound root_;
     uint32_t base_ = 0; ///< of the rays' part of the stack
 };
 

@@ -6,10 +6,10 @@
 namespace prolate::query {
 
 PlacedRay place(const Ray& ray, const RelativePose& to_frame, const Deformed& body, double margin) noexcept {
-    const PlacedEllipsoid root = body.bound(0);
+    const Bound root = body.bound(0);
     // What the deformation adds to the rounding that ray.hpp accounts for.
-    const double slack = kSeparationMargin * (root.reach + to_frame.distance);
-    return place(ray, to_frame, root, margin + slack);
+    const double slack = kSeparationMargin * (root.core.reach + to_frame.distance);
+    return place(ray, to_frame, root.core, margin + root.radius + slack);
 }
 
 // Is the node met, and from which parameter on, before the best hit?
@@ -20,9 +20,10 @@ bool RaySearch::test(uint32_t node_tested, double& enters) noexcept {
     }
     ++stats.pair_tests;
     stats.deepest_level = std::max(stats.deepest_level, body.tree().level_of(node_tested));
-    const PlacedEllipsoid bound = body.bound(node_tested);
+    const Bound bound = body.bound(node_tested);
+    const double within = margin + bound.radius;
     const auto met =
-        margin > 0 ? hit_within(margin, ray, bound, kDeformedRayMargin) : hit(ray, bound, kDeformedRayMargin);
+        within > 0 ? hit_within(within, ray, bound.core, kDeformedRayMargin) : hit(ray, bound.core, kDeformedRayMargin);
     if (!met || (found && met->t > best.t)) return false;
     enters = met->t;
     if (body.ends_at(node_tested) && body.triangles(node_tested).count == 0) {

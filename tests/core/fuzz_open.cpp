@@ -9,6 +9,7 @@
 #include "src/bytes.hpp"
 
 #include <prolate/collide.hpp>
+#include <prolate/deform.hpp>
 #include <prolate/solids.hpp>
 #include <prolate/tree.hpp>
 
@@ -107,9 +108,16 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const Ellipsoid root = tree.ellipsoid(0);
     const float reach = static_cast<float>(data[size - 2]) / 64 * root.l11;
     const Pose tame{{reach, -reach, reach / 2}, {1, static_cast<float>(data[size - 3]), 3, 4}};
+    float q[kMaxModes];
+    uint32_t modes = 0;
+    if (const auto deformation = tree.deformation())
+        for (; modes < deformation->mode_count(); ++modes) q[modes] = deformation->range(modes);
     const auto ask = [&](const Pose& a, const Pose& b) {
         const SolidsOptions limits{.max_level = options.max_level, .max_pair_tests = options.max_pair_tests};
         require(collide_solids(tree, a, tree, b, context, limits).stats.tests() <= limits.max_pair_tests);
+        const DeformedBody moved{tree, a, {q, modes}};
+        require(collide(moved, {tree, b}, context, options).stats.tests() <= options.max_pair_tests);
+        require(raycast(moved, {b.translation, {1, 2, 3}}, context, options).stats.tests() <= options.max_pair_tests);
         const CollideResult ab = collide(tree, a, tree, b, context, options);
         const CollideResult ba = collide(tree, b, tree, a, context, options);
         require(ab.verdict == ba.verdict && ab.stats.pair_tests == ba.stats.pair_tests);
