@@ -59,7 +59,7 @@ public:
 
     // The content of the section.
     Result<std::vector<std::byte>> run() {
-        for_each([this](std::span<const Vec> u, const Fit& fit, NodeMotion& motion, uint32_t) {
+        for_each([](std::span<const Vec> u, const Fit& fit, NodeMotion& motion, uint32_t) {
             std::vector<Vec> seen;
             for (const Vec& x : u) seen.emplace_back(fit.inverse * x);
             motion.shift = fit.factor * middle_of(seen);

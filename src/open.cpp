@@ -533,10 +533,10 @@ Result<void> TreeView::open_sections(size_t begin, bool check_hash) noexcept {
         const auto end = check_section(bytes_, at, check_hash);
         if (!end) return end.error();
         next = *end;
-        const auto [kind, content] = section(section_count_++);
-        const auto is = [&kind](const char(&known)[4]) { return std::memcmp(kind, known, sizeof known) == 0; };
-        const auto sound = is(kInnerKind)         ? open_inner(content, at, check_hash)
-                           : is(kDeformationKind) ? open_deformation(content, at)
+        const Section found = section(section_count_++);
+        const auto is = [&found](const char(&known)[4]) { return std::memcmp(found.kind, known, sizeof known) == 0; };
+        const auto sound = is(kInnerKind)         ? open_inner(found.content, at, check_hash)
+                           : is(kDeformationKind) ? open_deformation(found.content, at)
                                                   : Result<void>{}; // skipped, if it is not known
         if (!sound) return sound;
     }
