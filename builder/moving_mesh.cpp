@@ -35,9 +35,9 @@ Result<void> check(MeshView mesh, const Modes& modes) {
                         vertices);
     for (size_t i = 0; i < modes.displacements.size(); ++i) {
         const float x = modes.displacements[i];
-        if (!std::isfinite(x)) return bad_mesh("the displacement of a vertex is not finite", i / 3 % vertices);
+        if (!std::isfinite(x)) return bad_mesh("vertex displacement is not finite; repair the modes", i / 3 % vertices);
         if (std::abs(double{x}) * modes.ranges[i / (3 * vertices)] > double{kLargestCoordinate})
-            return bad_mesh("a vertex moves beyond 1.9e22 m (2^74); give a smaller range", i / 3 % vertices);
+            return bad_mesh("vertex moves beyond 1.9e22 m (2^74); give a smaller range", i / 3 % vertices);
     }
     return {};
 }
@@ -99,8 +99,8 @@ Result<void> MovingMesh::find_sources(MeshView input) {
         for (uint32_t m = 0; m < mode_count(); ++m)
             if (input_displacement(modes_, places[i].second, m, input_vertices_) !=
                 input_displacement(modes_, places[i - 1].second, m, input_vertices_))
-                return bad_mesh("vertices in one place, which are joined, have different displacements; "
-                                "give them the same",
+                return bad_mesh("vertex moves otherwise than another one in one place, with which it is joined; "
+                                "give them the same displacements",
                                 places[i].second);
     }
     for (const Vec3& v : vertices_) {

@@ -87,6 +87,17 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     return baked;
 }
 
+// Before a long bake: can the modes be read?
+Outcome<> check_modes(const Asset& a) {
+    if (a.modes.empty() && !a.ranges.empty())
+        return Failure{kUsage, "--range", "says how far modes go, and there are none", "give --modes"};
+    if (a.modes.empty()) return kSuccess;
+    if (is_standard_input(a.mesh))
+        return Failure{kUsage, "--modes", "need a mesh that can be read twice", "give the name of a file"};
+    const auto modes = read_modes(a.modes, a.ranges, {1, 1, 1});
+    return modes ? Outcome<>(kSuccess) : Outcome<>(modes.error());
+}
+
 // Gives the tree its modes, if there are any. The cache holds trees without: it knows no modes.
 Outcome<> deform(const Asset& a, Baked& baked) {
     if (a.modes.empty()) return kSuccess;
@@ -216,6 +227,7 @@ Outcome<Baked> bake_asset(const Asset& a, const Outputs& outputs, BakeCache& cac
                           const std::string& label) {
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
+    if (const auto possible = check_modes(a); !possible) return possible.error();
     auto baked = make(a, cache, rebake, label);
     if (!baked) return baked;
     if (const auto close = check_closeness(a, *baked); !close) return close.error();

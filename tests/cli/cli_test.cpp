@@ -16,6 +16,7 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -367,6 +368,54 @@ TEST_F(Cli, AnInnerCoverThroughEveryCommand) {
     EXPECT_EQ(open.code, 3);
     EXPECT_NE(open.err.find("an open mesh has no inside for an inner cover"), std::string::npos) << open.err;
     EXPECT_FALSE(fs::exists(file("b.etree")));
+}
+
+// An array of numpy's, of floats.
+std::string npy(const std::string& shape, const std::vector<float>& values) {
+    std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (" + shape + "), }";
+    header += std::string(117 - header.size(), ' ') + '\n'; // 128 bytes with what is before
+    const auto size = static_cast<char>(header.size());
+    std::string out = std::string("\x93NUMPY\x01", 7) + '\0' + size + '\0' + header;
+    return out.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
+}
+
+TEST_F(Cli, BakeTakesModesFromNumpysFiles) {
+    const std::string mesh = file("cube.obj", obj_text(cube())), tree = file("a.etree");
+    const size_t vertices = cube().vertices.size();
+    const std::string shape = "2, " + std::to_string(vertices) + ", 3";
+    std::vector<float> u(6 * vertices, 0.25f); // two translations
+    const auto bake = [&](const std::string& modes, std::initializer_list<std::string> options) {
+        std::vector<std::string> words{"bake", mesh,        "-o",   tree,      "--ellipsoids",
+                                       "1",    "--quality", "fast", "--modes", modes};
+        words.insert(words.end(), options);
+        return run(words);
+    };
+    const Outcome good = bake(file("u.npy", npy(shape, u)), {"--range", "0.5,2"});
+    ASSERT_EQ(good.code, 0) << good.err;
+    EXPECT_NE(run({"info", tree}).out.find("by 2 modes, coordinates within 0.5, 2"), std::string::npos);
+    const Json info = Json::parse(run({"info", tree, "--json"}).out);
+    EXPECT_EQ(info["mode_ranges"], (std::vector<double>{0.5, 2}));
+    EXPECT_TRUE(info["unknown_sections"].empty());
+    // The same options without modes are another file.
+    EXPECT_EQ(run({"bake", mesh, "-o", tree, "--ellipsoids", "1", "--quality", "fast"}).code, 0);
+    EXPECT_TRUE(Json::parse(run({"info", tree, "--json"}).out)["mode_ranges"].empty());
+
+    fs::remove(tree);
+    u[7] = std::numeric_limits<float>::quiet_NaN();
+    const std::vector<std::pair<Outcome, const char*>> cases = {
+        {bake(file("nan.npy", npy(shape, u)), {"--range", "1"}), "vertex displacement is not finite (index 2)"},
+        {bake(file("short.npy", npy("1, 2, 3", std::vector<float>(6))), {"--range", "1"}),
+         "another number of vertices"},
+        {bake(file("cut.npy", npy(shape, {1, 2})), {"--range", "1"}), "is cut off"},
+        {bake(file("u.npy", npy(shape, std::vector<float>(6 * vertices))), {}), "give --range"},
+        {bake(mesh, {"--range", "1"}), "is no array of numpy's"},
+        {bake(file("zip.npz", "PK and no more"), {}), "holds no array \"modes\""}};
+    for (const auto& [outcome, words] : cases) {
+        EXPECT_NE(outcome.code, 0) << words;
+        EXPECT_NE(outcome.err.find(words), std::string::npos) << words << " is not in: " << outcome.err;
+        EXPECT_FALSE(fs::exists(tree)) << words;
+    }
+    EXPECT_EQ(run({"bake", mesh, "-o", tree, "--range", "1"}).code, 2);
 }
 
 TEST_F(Cli, AMissingFolderIsFoundBeforeTheWork) {
