@@ -243,7 +243,7 @@ void bind_tree(nb::module_& m) {
              [](const HeldTree& self) { // float32 (M,), M = 0 without a deformation
                  std::vector<float> ranges;
                  if (const auto modes = self.view.deformation())
-                     for (uint32_t m = 0; m < modes->mode_count(); ++m) ranges.push_back(modes->range(m));
+                     for (uint32_t i = 0; i < modes->mode_count(); ++i) ranges.push_back(modes->range(i));
                  return to_numpy(ranges, {ranges.size()});
              })
         .def("info_dict", &info_of)
