@@ -258,12 +258,12 @@ nb::tuple bake(nb::handle vertices, nb::handle faces, nb::handle placement, cons
     return nb::make_tuple(owned_bytes(built->tree.bytes()), report);
 }
 
-// Bytes of the tree with its deformation. `modes` and `ranges` are float32, contiguous.
+// Bytes of the tree with its deformation.
 nb::object add_modes_to(nb::handle tree, nb::handle vertices, nb::handle faces, nb::handle placement, nb::handle modes,
                         nb::handle ranges) {
     const HeldTree& held = tree_of(tree, "tree");
     const TakenMesh mesh = take_mesh(vertices, faces, placement);
-    const nb::object keep[2] = {as_numpy(modes, "modes", "float32"), as_numpy(ranges, "ranges", "float32")};
+    const nb::object keep[2] = {as_numpy(modes, "modes", "float64"), as_numpy(ranges, "ranges", "float64")};
     const AnyArray of_modes = import_array(keep[0]), of_ranges = import_array(keep[1]);
     if (of_modes.ndim() != 3 || of_modes.shape(1) != mesh.view.vertices.size() || of_modes.shape(2) != 3)
         value_error("modes", "must have shape (M, " + std::to_string(mesh.view.vertices.size()) + ", 3), not " +
@@ -271,8 +271,14 @@ nb::object add_modes_to(nb::handle tree, nb::handle vertices, nb::handle faces, 
     if (of_ranges.ndim() != 1 || of_ranges.shape(0) != of_modes.shape(0))
         value_error("ranges",
                     "must have shape (" + std::to_string(of_modes.shape(0)) + ",), not " + of_ranges.shape_text());
-    const Modes given{{static_cast<const float*>(of_modes.data()), of_modes.size()},
-                      {static_cast<const float*>(of_ranges.data()), of_ranges.size()}};
+    const auto floats = [](const AnyArray& array) {
+        const auto* const from = static_cast<const double*>(array.data());
+        std::vector<float> out;
+        for (size_t i = 0; i < array.size(); ++i) out.push_back(static_cast<float>(from[i]));
+        return out;
+    };
+    const std::vector<float> displacements = floats(of_modes), most = floats(of_ranges);
+    const Modes given{displacements, most};
     Progress progress;
     const auto added = progress.run(nb::none(), [&] { return add_modes(held.view, mesh.view, given); });
     if (!added && added.error().code == ErrorCode::bad_options) throw nb::value_error(added.error().what);
