@@ -108,8 +108,8 @@ def test_free_threaded_python_is_refused_when_built(tmp_path, free):
 def test_the_command_and_bake_have_the_same_options():
     help_ = subprocess.run([_command._EXECUTABLE, "bake", "--help"], capture_output=True, text=True, check=True).stdout
     known = {name.replace("-", "_") for name in re.findall(r"^ +(?:-\w,)?--([a-z-]+)", help_, re.MULTILINE)}
-    # Files, the console, and what bake_many() has.
-    known -= {"help", "quiet", "output", "report", "json", "force", "manifest", "cache", "rebake"}
+    # Files, the console, and what bake_many() and Tree.with_modes() have.
+    known -= {"help", "quiet", "output", "report", "json", "force", "manifest", "cache", "rebake", "modes", "range"}
     assert set(inspect.signature(prolate.bake).parameters) == known | {"vertices", "faces", "progress"}
 
 
