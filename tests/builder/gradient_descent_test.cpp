@@ -54,7 +54,14 @@ std::vector<uint32_t> nearest_of(std::span<const Fit> fits, std::span<const Vec>
 }
 
 DescentOptions options_for(int iterations, Primitive primitive = Primitive::ellipsoid) {
-    return {{0.5, 0.5, 0.3}, primitive, iterations, 256, 1e-5, false, 1, 7};
+    return {.objective = {0.5, 0.5, 0.3},
+            .primitive = primitive,
+            .iterations = iterations,
+            .directions = 256,
+            .min_radius = 1e-5,
+            .relocate = false,
+            .first_kappa = 1,
+            .seed = 7};
 }
 
 void descend_onto(const Mesh& mesh, std::vector<Fit>& set, const DescentOptions& options) {
