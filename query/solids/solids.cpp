@@ -92,7 +92,7 @@ struct Solids {
         return come_within(found, within) ? Verdict::overlapping : Verdict::separated; // as far as can be told
     }
     bool come_within(const CollideResult& found, double within) const {
-        if (found.enclosed) return within >= 0;
+        if (found.enclosed) return within >= 0 || leaves_hold_ball(-within);
         const MeetingPair& pair = found.pair;
         const auto ellipsoid_a = [&] { return query::place(inner_a->ellipsoid(pair.node_a), inner_a->scale()); };
         const auto ellipsoid_b = [&] {
@@ -103,6 +103,17 @@ struct Solids {
         if (pair.triangle_b != kNoTriangle)
             return prolate::come_within(query::place(*inner_b, pair.triangle_b, b_to_a), ellipsoid_a(), within);
         return prolate::come_within(ellipsoid_a(), ellipsoid_b(), within);
+    }
+
+    // Of ellipsoids among triangles: as no triangle meets them, their centers are at least that far from these.
+    bool leaves_hold_ball(double radius) const {
+        const TreeView& covers = inner_a->has_triangles() ? *inner_b : *inner_a;
+        bool all = true;
+        covers.for_each_in_cut(covers.level_count() - 1, [&](uint32_t node) {
+            const query::PlacedEllipsoid e = query::place(covers.ellipsoid(node), covers.scale());
+            all = all && query::least_width(e.factor, e.size) >= radius;
+        });
+        return all;
     }
 
     DistanceResult distance(const TreeView& x, const TreeView& y, DistanceOptions options) {

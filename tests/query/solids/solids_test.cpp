@@ -238,6 +238,16 @@ TEST_F(Solids, TinyCoversMeetTrianglesOnlyWhereThatIsCertain) {
     }
 }
 
+TEST_F(Solids, CoversWithinTrianglesMeetThemUnlessTheyMayBeDisplacedBeyondThem) {
+    const TreeView tiny = *torus().covers.view().scaled(0.05f), around = crossed().exact.view();
+    const auto verdict = [&](float uncertainty) {
+        return collide_solids(tiny, {}, around, {}, context(), {.uncertainty = uncertainty}).verdict;
+    };
+    EXPECT_EQ(verdict(0), Verdict::overlapping);
+    EXPECT_EQ(verdict(1e-6f), Verdict::overlapping);
+    EXPECT_EQ(verdict(1), Verdict::undecided);
+}
+
 TEST_F(Solids, LargerMarginsStayCertain) {
     Random random(6);
     const TreeView x = torus().covers.view(), y = crossed().covers.view();
