@@ -10,7 +10,7 @@ namespace prolate::cli {
 namespace {
 
 constexpr LengthUnit kUnits[] = {{"mm", 0.001}, {"cm", 0.01}, {"m", 1}, {"in", 0.0254}, {"ft", 0.3048}};
-constexpr const char* kAdvice = "write a length with its unit: mm, cm, m, in or ft, as in 5mm";
+constexpr const char* kLengthAdvice = "write a length with its unit: mm, cm, m, in or ft, as in 5mm";
 
 std::string rounded(double metres, const LengthUnit& unit, double (*round)(double)) {
     const double value = metres / unit.metres;
@@ -30,7 +30,7 @@ const LengthUnit* find_length_unit(std::string_view name) {
 }
 
 Outcome<Length> read_length(const std::string& option, const std::string& text) {
-    const auto refuse = [&option](const std::string& what, const std::string& advice = kAdvice) {
+    const auto refuse = [&option](const std::string& what, const std::string& advice = kLengthAdvice) {
         return Failure{kUsage, option, what, advice};
     };
     char* end = nullptr;

@@ -14,7 +14,7 @@ Vec3 load_point(const std::byte* from) {
     return {load_le<float>(from), load_le<float>(from + 4), load_le<float>(from + 8)};
 }
 
-Error bad(const char* what, uint64_t where) {
+Error bad_section(const char* what, uint64_t where) {
     return {ErrorCode::bad_file, what, where};
 }
 
@@ -26,16 +26,17 @@ Result<void> check_rows(std::span<const std::byte> content, uint32_t modes) {
         const float range = load_le<float>(row + kModeRange), shift = load_le<float>(row + kShiftStep),
                     growth = load_le<float>(row + kGrowthStep), radius = load_le<float>(row + kRadiusStep);
         if (!(range > 0 && range <= std::numeric_limits<float>::max()))
-            return bad("the range of a mode is not above 0 and finite", at + kModeRange);
+            return bad_section("the range of a mode is not above 0 and finite", at + kModeRange);
         // Rounded up by half.
         const auto within = [range](float step, double most) {
             return step >= 0 && double{range} * step * kMostSteps <= 1.5 * most;
         };
         if (!within(shift, double{kLargestCoordinate}))
-            return bad("the step of a mode's shifts is out of range", at + kShiftStep);
-        if (!within(growth, kMostGrowth)) return bad("the step of a mode's growths is out of range", at + kGrowthStep);
+            return bad_section("the step of a mode's shifts is out of range", at + kShiftStep);
+        if (!within(growth, kMostGrowth))
+            return bad_section("the step of a mode's growths is out of range", at + kGrowthStep);
         if (!within(radius, double{kLargestCoordinate}))
-            return bad("the step of a mode's radii is out of range", at + kRadiusStep);
+            return bad_section("the step of a mode's radii is out of range", at + kRadiusStep);
     }
     return {};
 }
@@ -86,26 +87,28 @@ Vec3 Deformation::displacement(uint32_t p, uint32_t mode) const noexcept {
 }
 
 Result<void> check_deformation(std::span<const std::byte> content, const TreeView& tree) noexcept {
-    if (content.size() < kModeRows) return bad("wrong size of a deformation", 0);
+    if (content.size() < kModeRows) return bad_section("wrong size of a deformation", 0);
     const auto modes = load_le<uint32_t>(content.data() + kModeCount),
                points = load_le<uint32_t>(content.data() + kPointCount);
     const bool exact = tree.has_triangles();
-    if (modes < 1 || modes > kMaxModes) return bad("a deformation has 1 to 64 modes", kModeCount);
+    if (modes < 1 || modes > kMaxModes) return bad_section("a deformation has 1 to 64 modes", kModeCount);
     if (exact ? points != tree.vertex_count() : points < 1)
-        return bad("a deformation of other points than the tree's", kPointCount);
-    if (load_le<uint64_t>(content.data() + kModeZeros) != 0) return bad("reserved bytes are not zero", kModeZeros);
+        return bad_section("a deformation of other points than the tree's", kPointCount);
+    if (load_le<uint64_t>(content.data() + kModeZeros) != 0)
+        return bad_section("reserved bytes are not zero", kModeZeros);
     if (content.size() != deformation_bytes(modes, tree.slot_count(), points, exact))
-        return bad("wrong size of a deformation", 0);
+        return bad_section("wrong size of a deformation", 0);
     if (const auto sound = check_rows(content, modes); !sound) return sound;
     for (uint32_t slot = 0; slot < tree.slot_count(); ++slot) {
         const size_t bytes = size_t{modes} * kMotionBytes, at = motions_begin(modes) + slot * bytes;
         const auto row = content.subspan(at, bytes);
         if (!tree.is_node(slot) && std::any_of(row.begin(), row.end(), [](std::byte b) { return b != std::byte{0}; }))
-            return bad("a lane without a node is not zero", at);
+            return bad_section("a lane without a node is not zero", at);
     }
     for (auto at = static_cast<size_t>(points_begin(modes, tree.slot_count())); at < content.size(); at += 4)
         if (!(std::abs(load_le<float>(content.data() + at)) <= kLargestCoordinate)) // also a NaN
-            return bad("a point or a displacement is not finite, or beyond the largest coordinate (2^74 m)", at);
+            return bad_section("a point or a displacement is not finite, or beyond the largest coordinate (2^74 m)",
+                               at);
     return {};
 }
 

@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kAdvice = "see 'prolate bake --help'";
+constexpr const char* kManifestAdvice = "see 'prolate bake --help'";
 
 // One entry of the manifest and what became of it.
 struct Entry {
@@ -43,7 +43,7 @@ Outcome<Json> read_json(const std::string& path) {
     } catch (const Json::exception& e) {
         std::string what = e.what(); // "[json.exception...] parse error at line 3, column 1: ..."
         if (const size_t at = what.find("] "); at != what.npos) what.erase(0, at + 2);
-        return Failure{kBadInput, path, "is not JSON: " + what, kAdvice};
+        return Failure{kBadInput, path, "is not JSON: " + what, kManifestAdvice};
     }
 }
 
@@ -117,7 +117,7 @@ Outcome<std::vector<Entry>> read_manifest(const std::string& path, const Manifes
     const auto json = read_json(path);
     if (!json) return json.error();
     const Json& root = *json;
-    const auto refuse = [&path](const std::string& what) { return Failure{kBadInput, path, what, kAdvice}; };
+    const auto refuse = [&path](const std::string& what) { return Failure{kBadInput, path, what, kManifestAdvice}; };
     if (!root.is_object() || !root.contains("assets") || !root["assets"].is_array())
         return refuse("must be an object with an array \"assets\"");
     for (const auto& item : root.items())

@@ -18,8 +18,8 @@
 namespace prolate::cli {
 namespace {
 
-constexpr const char* kAdvice = "write it with numpy.savez(path, modes=modes, ranges=ranges), modes of shape "
-                                "(modes, vertices, 3)";
+constexpr const char* kModesAdvice = "write it with numpy.savez(path, modes=modes, ranges=ranges), modes of shape "
+                                     "(modes, vertices, 3)";
 
 struct Array {
     std::vector<size_t> shape;
@@ -27,7 +27,7 @@ struct Array {
 };
 
 Failure bad(const std::string& path, std::string what) {
-    return {kBadInput, path, std::move(what), kAdvice};
+    return {kBadInput, path, std::move(what), kModesAdvice};
 }
 
 // The text between `begin` and the next `end` behind the dictionary's key.
