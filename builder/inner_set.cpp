@@ -26,10 +26,10 @@
 namespace prolate {
 namespace {
 
-constexpr double kReach = 3;        // of the unit ball: how far a step looks, and the ellipsoid may grow
-constexpr size_t kMostPlanes = 60;  // of a step
-constexpr double kLeastGain = 1.02; // of volume, for another step
-constexpr double kSpacing = 0.7;    // of seeds of the first round, in their depths
+constexpr double kReach = 3;              // of the unit ball: how far a step looks, and the ellipsoid may grow
+constexpr size_t kMostPlanes = 60;        // of a step
+constexpr double kLeastVolumeGain = 1.02; // of volume, for another step
+constexpr double kSpacing = 0.7;          // of seeds of the first round, in their depths
 constexpr double kNeighbourhood = 1.4;
 constexpr uint32_t kFewPoints = 12; // that are not worth an ellipsoid
 constexpr double kThickest = 0.05;  // of the longest radius, the least that an ellipsoid starts with
@@ -142,7 +142,7 @@ private:
             const Mat factor = start.factor * local.factor;
             Fit next(start.center + start.factor * local.center, cholesky(factor * factor.transpose()));
             next = next.scaled(clearance(next, surface_, kReach));
-            if (!(next.volume() > kLeastGain * start.volume())) break;
+            if (!(next.volume() > kLeastVolumeGain * start.volume())) break;
             out.push_back(start = next);
         }
         return out;

@@ -72,9 +72,9 @@ public:
             measure(u, fit, motion, mesh_.range(m));
         });
         find_steps(
-            growth_steps_, [](const NodeMotion& n) { return n.growth; }, kMostSteps);
+            growth_steps_, [](const NodeMotion& n) { return n.growth; }, kMostMotionSteps);
         find_steps(
-            radius_steps_, [](const NodeMotion& n) { return n.radius; }, kMostSteps);
+            radius_steps_, [](const NodeMotion& n) { return n.radius; }, kMostMotionSteps);
         if (const auto sound = check_growth(); !sound) return sound.error();
         return content();
     }
@@ -126,7 +126,7 @@ private:
         double grown = 0;
         for (uint32_t m = 0; m < modes_; ++m)
             grown += (all_[m].growth + all_[m].radius / size) * double{mesh_.range(m)};
-        if (grown < kMostGrowth) return {};
+        if (grown < kMostMotionGrowth) return {};
         return Error{ErrorCode::bad_options,
                      "in these ranges the body would grow more than a thousandfold; give smaller ones", 0};
     }

@@ -29,11 +29,11 @@ Result<void> check_rows(std::span<const std::byte> content, uint32_t modes) {
             return bad_section("the range of a mode is not above 0 and finite", at + kModeRange);
         // Rounded up by half.
         const auto within = [range](float step, double most) {
-            return step >= 0 && double{range} * step * kMostSteps <= 1.5 * most;
+            return step >= 0 && double{range} * step * kMostMotionSteps <= 1.5 * most;
         };
         if (!within(shift, double{kLargestCoordinate}))
             return bad_section("the step of a mode's shifts is out of range", at + kShiftStep);
-        if (!within(growth, kMostGrowth))
+        if (!within(growth, kMostMotionGrowth))
             return bad_section("the step of a mode's growths is out of range", at + kGrowthStep);
         if (!within(radius, double{kLargestCoordinate}))
             return bad_section("the step of a mode's radii is out of range", at + kRadiusStep);
@@ -67,7 +67,7 @@ Deformation::Motion Deformation::motion(uint32_t slot, uint32_t mode) const noex
     for (size_t i = 0; i < 3; ++i) out.shift[i] = load_le<int16_t>(at + kShift + 2 * i) * step;
     const auto steps = load_le<uint16_t>(at + kGrowth);
     if ((steps & kIsRadius) != 0)
-        out.radius = (steps & kMostSteps) * double{load_le<float>(row + kRadiusStep)};
+        out.radius = (steps & kMostMotionSteps) * double{load_le<float>(row + kRadiusStep)};
     else
         out.growth = steps * double{load_le<float>(row + kGrowthStep)};
     return out;

@@ -22,12 +22,12 @@ enum DeformationOffset : size_t {
 enum ModeRowOffset : size_t { kModeRange = 0, kShiftStep = 4, kGrowthStep = 8, kRadiusStep = 12, kModeRowBytes = 16 };
 // Of a node and a mode, in these steps: three int16, and a uint16, a growth, or with the highest bit a radius.
 enum MotionOffset : size_t { kShift = 0, kGrowth = 6, kMotionBytes = 8 };
-inline constexpr uint16_t kIsRadius = 0x8000, kMostSteps = 0x7fff;
+inline constexpr uint16_t kIsRadius = 0x8000, kMostMotionSteps = 0x7fff;
 inline constexpr size_t kPointBytes = 12;
 
 /// At the ends of its coordinates' ranges, the root is larger by no more than this factor: with more, modes and ranges
 /// make no sense. Nor does any node grow by more in one mode, so that all sums are finite.
-inline constexpr double kMostGrowth = 1024;
+inline constexpr double kMostMotionGrowth = 1024;
 
 /// Where the nodes' motions begin, the points, and their displacements.
 constexpr size_t motions_begin(uint32_t modes) {

@@ -396,7 +396,7 @@ TEST_F(Deform, ProofNoticesBoundsThatAreTooSmall) {
         uint16_t value;
         std::memcpy(&value, growth, 2);
         const uint16_t kind = value & kIsRadius;
-        value &= kMostSteps;
+        value &= kMostMotionSteps;
         if (value < 100) return;
         ++planted;
         value = static_cast<uint16_t>(value * 0.98);
