@@ -51,7 +51,7 @@ private:
 
         uint32_t place_of(uint32_t neighbour) const noexcept; // neighbour_count: nowhere
     };
-    static constexpr uint32_t kKnown = 24;
+    static constexpr uint32_t kKnown = 12;
 
     template <class Visit> void find(uint32_t vertex, Visit&& visit) const;
     const Known* known(uint32_t vertex) const;
