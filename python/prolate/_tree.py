@@ -207,7 +207,10 @@ class Tree(_core.Tree):
         """
         import numpy as np
 
-        displacements = np.asarray(modes, dtype=float)
+        try:
+            displacements = np.asarray(modes, dtype=float)
+        except (ValueError, TypeError) as error:
+            raise type(error)(f"modes: {error}; give an array (M, V, 3)") from None
         if isinstance(mesh, Mesh):
             vertices, triangles, placement = mesh.vertices, mesh.faces, (mesh.scale, mesh.origin)
         else:
