@@ -211,6 +211,7 @@ class Tree(_core.Tree):
             displacements = np.asarray(modes, dtype=float)
         except (ValueError, TypeError) as error:
             raise type(error)(f"modes: {error}; give an array (M, V, 3)") from None
+        placement: Any
         if isinstance(mesh, Mesh):
             vertices, triangles, placement = mesh.vertices, mesh.faces, (mesh.scale, mesh.origin)
         else:
