@@ -1,4 +1,5 @@
-// Bodies that deform by modes: do they meet, and where does a ray meet them? deformation.hpp says how they deform.
+// Bodies that deform by modes: do they meet, how far apart are they, and where does a ray meet them? deformation.hpp
+// says how they deform.
 //
 // What a deforming body is, at coordinates q:
 //  - its surface: the triangles of its mesh, each with its corners where q moves them, and if the mesh is closed, all
@@ -23,6 +24,7 @@
 #pragma once
 
 #include <prolate/collide.hpp>
+#include <prolate/distance.hpp>
 #include <prolate/raycast.hpp>
 
 #include <cstdint>
@@ -42,7 +44,7 @@ enum class Undecided : uint8_t {
     no,          ///< it did decide
     coordinates, ///< there are more or fewer than the tree has modes, or one is out of range or NaN: no bound holds
     input,       ///< a pose or a ray is not finite, or the scratch is too small
-    budget,      ///< options.max_pair_tests ran out
+    budget,      ///< options.max_pair_tests ran out, or distance() was to look no deeper than options.max_level
 };
 
 /// Answer of collide() for deformed bodies.
@@ -56,6 +58,22 @@ struct DeformedCollideResult : CollideResult {
 /// Thread-safe on shared trees.
 DeformedCollideResult collide(const DeformedBody& a, const DeformedBody& b, Scratch context,
                               const QueryOptions& options = {}) noexcept;
+
+/// Answer of distance() for deformed bodies. `lower`, metres, is certified of the deformed meshes, their inside
+/// included: they are not nearer. `upper` is that of triangles of exact trees, and of the leaf ellipsoids of others:
+/// such bodies are not farther apart. Leaves count as no nearer to each other than what the nodes above them hold: then
+/// points are named that are less than `upper` apart. If `enclosed`, a part of one body may lie inside the other, and
+/// lower is 0; upper and the points are those of the surfaces. Undecided: 0 <= distance <= infinity, unless the budget
+/// is why.
+struct DeformedDistanceResult : DistanceResult {
+    Undecided reason = Undecided::input;
+};
+
+/// How far apart are two bodies, and where? As distance() of rigid bodies, anytime and with its options.
+/// `overlapping` only if collide() says so, and where it does, `separated` only for gaps that rounding hides. Takes as
+/// much scratch as distance() of the same trees. Thread-safe on shared trees.
+DeformedDistanceResult distance(const DeformedBody& a, const DeformedBody& b, Scratch context,
+                                const DistanceOptions& options = {}) noexcept;
 
 /// Answer of raycast() for deformed bodies.
 struct DeformedRaycastResult : RaycastResult {

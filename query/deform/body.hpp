@@ -41,8 +41,9 @@ public:
     /// What holds all that `node` stands for.
     Bound bound(uint32_t node) const noexcept;
     PlacedTriangle triangle(uint32_t t) const noexcept;
-    /// Does the search end at `node`? Its triangles are none then, if it is not a leaf.
-    bool ends_at(uint32_t node) const noexcept { return node >= limit_from_ || tree().is_leaf(node); }
+    /// Is it on level max_level, so that it is not to be opened?
+    bool too_deep(uint32_t node) const noexcept { return node >= limit_from_; }
+    bool ends_at(uint32_t node) const noexcept { return too_deep(node) || tree().is_leaf(node); }
     TriangleRange triangles(uint32_t node) const noexcept { return tree().triangles(node); }
 
     /// One point at least of each connected part of the surface; of a rigid tree without triangles there are none.

@@ -94,4 +94,11 @@ Enclosure look_inside(const Deformed& inner, const Deformed& outer, const Relati
     return Look(inner, outer, inner_to_outer, stack, most_tests, stats).run();
 }
 
+Enclosure look_inside_both(const DeformedPair& pair, Scratch::Entry* stack, uint64_t most_tests,
+                           QueryStats& stats) noexcept {
+    const Enclosure found = look_inside(pair.b, pair.a, pair.b_to_a, stack, most_tests, stats);
+    if (found != Enclosure::none) return found;
+    return look_inside(pair.a, pair.b, inverse(pair.b_to_a), stack, most_tests, stats);
+}
+
 } // namespace prolate::query

@@ -1,7 +1,7 @@
 // Where surfaces do not meet: does one deformed body hold a part of the other?
 #pragma once
 
-#include "query/deform/body.hpp"
+#include "query/deform/pair.hpp"
 
 #include <prolate/query.hpp>
 
@@ -16,5 +16,8 @@ enum class Enclosure : uint8_t { none, perhaps, out_of_tests };
 /// has a part for each leaf. `stack` holds what searches of both trees need.
 Enclosure look_inside(const Deformed& inner, const Deformed& outer, const RelativePose& inner_to_outer,
                       Scratch::Entry* stack, uint64_t most_tests, QueryStats& stats) noexcept;
+/// Certainly none of either body in the other?
+Enclosure look_inside_both(const DeformedPair& pair, Scratch::Entry* stack, uint64_t most_tests,
+                           QueryStats& stats) noexcept;
 
 } // namespace prolate::query

@@ -39,7 +39,7 @@ int main(int argc, char** argv) {
 
     const DeformedBody at_rest{tree};
     row("deform.hpp", collide(at_rest, {tree, near}, context).verdict == Verdict::overlapping &&
-                          collide(at_rest, {tree, far}, context).verdict == Verdict::separated);
+                          distance(at_rest, {tree, far}, context).verdict == Verdict::separated);
 
     const DistanceResult d = distance(tree, here, tree, far, context);
     row("distance.hpp", d.lower > 1 && d.lower <= d.upper && d.upper < 10);
