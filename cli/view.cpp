@@ -3,6 +3,7 @@
 #include "cli/console.hpp"
 #include "cli/inputs.hpp"
 #include "cli/mesh_options.hpp"
+#include "cli/moving.hpp"
 #include "cli/outputs.hpp"
 #include "cli/pose.hpp"
 #include "cli/progress_line.hpp"
@@ -30,7 +31,10 @@ with the tree, and how far the ellipsoids stick out of it; an exact tree brings 
 file that needs no network and no server, and sends nothing anywhere. It needs a browser with WebGL 2, as all have
 had since 2021. Press ? in it for help.
 
-If a tree has an inner cover (bake --inner), sections and wires show it in green. Press S to cut the tree open.
+If a tree has an inner cover (bake --inner), the page begins with both covers cut open. A slider moves the plane.
+
+If a tree deforms (bake --modes), the page has a slider for each of its modes, and plays them. The ellipsoids move and
+grow as queries take them; the mesh moves with them if --modes names the file that bake had, or if the tree is exact.
 
 With two trees, you can drag one body against the other. The verdict, the distance, the nearest points and the
 counts come from prolate's own runtime, compiled to WebAssembly; this needs a command that was built where
@@ -39,11 +43,12 @@ emscripten was installed.
 Examples:
   prolate view horse.etree horse.obj -o horse.html
   prolate view horse.etree horse.obj bunny.etree bunny.obj -o both.html
+  prolate view moving.etree horse.obj --modes modes.npz -o moving.html
   prolate view horse.etree bunny.etree --pose 0.5,0,0 -o - >both.html)";
 
 struct ViewArguments {
     std::vector<std::string> files;
-    std::string output, up = "y", pose;
+    std::string output, up = "y", pose, modes;
     MeshOptions mesh_options;
     Outputs outputs;
 };
@@ -62,16 +67,17 @@ std::string name_of(const std::string& path) {
 }
 
 // A tree as it was named on the command line, and what was read.
-struct Asset {
+struct ViewedAsset {
     std::string tree_path, mesh_path;
     std::optional<Tree> tree;
     std::optional<CleanMesh> mesh;
     bool own_mesh = true;
+    std::vector<float> displacements = {}; // of the mesh's vertices, as modes move them; or unknown
 };
 
 // Which mesh belongs to which tree; nothing if that is not clear.
-std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& files) {
-    std::vector<Asset> assets;
+std::optional<std::vector<ViewedAsset>> sort_files(const std::vector<std::string>& files) {
+    std::vector<ViewedAsset> assets;
     for (const std::string& path : files) {
         if (is_tree(path) || (assets.empty() && is_standard_input(path)))
             assets.push_back({path, "", {}, {}, true});
@@ -83,25 +89,34 @@ std::optional<std::vector<Asset>> sort_files(const std::vector<std::string>& fil
     return assets;
 }
 
-Outcome<> read_asset(Asset& asset, const MeshOptions& mesh_options) {
-    auto tree = read_tree(asset.tree_path);
-    if (!tree) return tree.error();
-    asset.tree = std::move(*tree);
-    if (asset.mesh_path.empty()) {
-        if (asset.tree->view().has_triangles()) asset.mesh = mesh_of(asset.tree->view());
-        return kSuccess;
+Outcome<> read_asset(ViewedAsset& asset, const MeshOptions& mesh_options, const std::string& modes_path) {
+    auto read = read_tree(asset.tree_path);
+    if (!read) return read.error();
+    asset.tree = std::move(*read);
+    const TreeView tree = asset.tree->view();
+    if (!asset.mesh_path.empty()) {
+        auto mesh = read_mesh_of(tree, asset.mesh_path, mesh_options);
+        if (!mesh) return mesh.error();
+        asset.own_mesh = mesh->own;
+        if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
+        if (!modes_path.empty()) {
+            auto displacements = displacements_of(tree, mesh->as_read, mesh->cleaned.mesh.vertices, modes_path);
+            if (!displacements) return displacements.error();
+            asset.displacements = std::move(*displacements);
+        }
+        asset.mesh = std::move(mesh->cleaned);
     }
-    auto mesh = read_mesh_of(asset.tree->view(), asset.mesh_path, mesh_options);
-    if (!mesh) return mesh.error();
-    asset.own_mesh = mesh->own;
-    if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
-    asset.mesh = std::move(mesh->cleaned);
+    // By the numbers of the tree's own vertices it knows how they move.
+    if (tree.has_triangles() && asset.own_mesh && (!asset.mesh || tree.deformation())) {
+        asset.mesh = mesh_of(tree);
+        if (tree.deformation()) asset.displacements = displacements_of(tree);
+    }
     return kSuccess;
 }
 
 // What the page shows: trees with their meshes, and where the second body is.
 struct Request {
-    std::vector<Asset> assets;
+    std::vector<ViewedAsset> assets;
     std::optional<Pose> pose;
 };
 
@@ -114,6 +129,8 @@ Outcome<Request> request_of(const ViewArguments& a) {
                        "name one or two .etree files, each with at most one mesh after it"};
     if (assets->size() > 2)
         return Failure{kUsage, "view", fmt::format("{} trees are too many", assets->size()), "name one or two"};
+    if (!a.modes.empty() && assets->front().mesh_path.empty())
+        return Failure{kUsage, "--modes", "there is no mesh that they move", "name the mesh after the tree"};
     const bool two = assets->size() == 2;
     Request out{std::move(*assets), {}};
     if (!a.pose.empty()) {
@@ -132,10 +149,11 @@ Outcome<ExitCode> run(ViewArguments& a) {
     use_available_threads();
     auto request = request_of(a);
     if (!request) return request.error();
-    for (const Asset& asset : request->assets) {
+    for (const ViewedAsset& asset : request->assets) {
         a.outputs.reads(asset.tree_path, "the tree");
         a.outputs.reads_mesh(asset.mesh_path, "the mesh");
     }
+    a.outputs.reads(a.modes, "the modes");
     if (const auto claimed = a.outputs.claim(a.output, "the page", "html"); !claimed) return claimed.error();
 
     nlohmann::ordered_json scene{
@@ -148,11 +166,12 @@ Outcome<ExitCode> run(ViewArguments& a) {
     scene["bodies"] = nlohmann::ordered_json::array();
     const bool two = request->assets.size() == 2;
     NumberBlock numbers;
-    for (Asset& asset : request->assets) {
-        if (const auto read = read_asset(asset, a.mesh_options); !read) return read.error();
+    for (ViewedAsset& asset : request->assets) {
+        const bool first = &asset == request->assets.data();
+        if (const auto read = read_asset(asset, a.mesh_options, first ? a.modes : ""); !read) return read.error();
         ProgressLine line;
         auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
-                               std::move(asset.mesh), asset.own_mesh},
+                               std::move(asset.mesh), asset.own_mesh, std::move(asset.displacements)},
                               numbers, two, [&line](double fraction) { return line.show("measuring", fraction); });
         if (!body) return failure_of("view", Error{ErrorCode::cancelled});
         scene["bodies"].push_back(std::move(*body));
@@ -172,6 +191,9 @@ void add_view(CLI::App& app, Work& chosen) {
         ->type_name("TREE [MESH] [TREE [MESH]]");
     command->add_option("-o,--output", a->output, "the HTML file to write, or - for standard output")->required();
     declare_mesh_options(*command, a->mesh_options, true);
+    command->add_option(
+        "--modes", a->modes,
+        "the modes that the first tree was baked with: its mesh then moves with it (an exact tree knows them)");
     command->add_option("--pose", a->pose, "of the second body in the frame of the first: tx,ty,tz[,qx,qy,qz,qw]");
     command->add_option("--up", a->up, "the models' axis that points up")
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(kUpAxes), std::end(kUpAxes))))

@@ -1,5 +1,5 @@
 // A body's buffers: the ellipsoids of the cut that is shown, the mesh, and the distances around the solid.
-import {kBodyColours, kContact, kInner, kMesh, kMeshInside} from './colours.js';
+import {kBodyColours, kContact, kInner, kMesh, kMeshInside, kOuter} from './colours.js';
 import {bindTexture, vertexArray} from './gl.js';
 
 const kRowBits = 28; // of an id: the node's row + 1; above it the body, ...
@@ -8,18 +8,18 @@ const kInnerBit = 8; // ... and this bit if it is one of the inner cover
 export const idOf = (body, row) => (body << kRowBits | (row + 1)) >>> 0;
 // Of an inner cover, which the pointer passes over.
 const idOfInner = (body, row) => idOf(body | kInnerBit, row);
-export const nodeOf = (id) => (id === 0 || id >>> kRowBits & kInnerBit ?
-                                   null :
-                                   {body: id >>> kRowBits, row: (id & ((1 << kRowBits) - 1)) - 1});
+export const nodeOf = (id) =>
+    (id === 0 || id >>> kRowBits & kInnerBit ? null : {body: id >>> kRowBits, row: (id & ((1 << kRowBits) - 1)) - 1});
 
 export class BodyLayers {
   constructor(gl, body, index) { Object.assign(this, {gl, body, index, level: -1}); }
 
   /// Shows the cut at `level`; `marked` holds rows of nodes to be marked.
   show(level, marked) {
-    if (level === this.level && marked === this.marked) return;
-    const rows = this.body.cut(level), {ellipsoid, colour} = this.body.nodes;
-    if (level !== this.level) {
+    const {ellipsoid, version} = this.body, {colour} = this.body.nodes;
+    if (level === this.level && marked === this.marked && version === this.version) return;
+    const rows = this.body.cut(level);
+    if (level !== this.level || version !== this.version) {
       const shapes = new Float32Array(9 * rows.length), colours = new Uint8Array(3 * rows.length);
       rows.forEach((row, i) => {
         shapes.set(ellipsoid.subarray(9 * row, 9 * row + 9), 9 * i);
@@ -27,7 +27,7 @@ export class BodyLayers {
       });
       this.coverArray?.free();
       this.coverArray = ellipsoidArray(this.gl, shapes, colours, rows.map((row) => idOf(this.index, row)));
-      Object.assign(this, {level, count: rows.length, marked: undefined});
+      Object.assign(this, {level, version, count: rows.length, marked: undefined});
     }
     if (marked !== this.marked) {
       this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.coverArray.buffers[5]);
@@ -36,9 +36,9 @@ export class BodyLayers {
     }
   }
 
-  /// The inner cover at the same level, green, before all else in a section.
+  /// The inner cover at the same level, before all else in a section. It is that of the body at rest.
   drawInner(programWith, view, look) {
-    if (!this.body.inner) return;
+    if (!this.body.inner || this.body.moved) return;
     if (this.innerLevel !== this.level) {
       const rows = this.body.innerCut(this.level), {ellipsoid} = this.body.inner.nodes;
       const shapes = new Float32Array(9 * rows.length);
@@ -48,8 +48,7 @@ export class BodyLayers {
       this.innerArray = ellipsoidArray(this.gl, shapes, colours, ids);
       Object.assign(this, {innerLevel: this.level, innerCount: rows.length});
     }
-    const program =
-        programWith({WIRE: false, SECTION: Boolean(look.section), HAS_DISTANCE: false, OUTSIDE: false});
+    const program = programWith({WIRE: false, SECTION: Boolean(look.section), HAS_DISTANCE: false, OUTSIDE: false});
     program.use({
       ...view,
       u_of_body: true,
@@ -67,7 +66,7 @@ export class BodyLayers {
   drawCover(programWith, view, look) {
     const {gl, body} = this, {lattice} = body, outside = look.colouring === 'outside';
     // Made when first needed: the first picture comes sooner.
-    const distances = Boolean(lattice && (outside || look.section));
+    const distances = Boolean(lattice && !body.moved && (outside || look.section)); // they are of the body at rest
     if (distances) {
       this.distances ??= distanceTexture(gl, lattice);
       bindTexture(gl, 0, this.distances, gl.TEXTURE_3D);
@@ -81,8 +80,8 @@ export class BodyLayers {
     program.use({
       ...view,
       u_line: 0.6 * look.line,
-      u_of_body: look.colouring !== 'branch',
-      u_body_colour: look.colouring === 'body' ? kBodyColours[this.index] : kMesh,
+      u_of_body: look.colouring === 'body' || look.colouring === 'covers' || (outside && !body.moved),
+      u_body_colour: {body: kBodyColours[this.index], covers: kOuter}[look.colouring] ?? kMesh,
       u_mark_colour: kContact,
       u_solid_colour: kMesh,
       u_distance: 0,
@@ -97,11 +96,50 @@ export class BodyLayers {
   }
 
   drawMesh(program, view, look) {
-    if (!this.body.mesh) return;
-    this.meshArray ??= vertexArray(this.gl, {0: {data: cornersOf(this.body.mesh), size: 3}});
+    if (!this.body.showsMesh) return;
+    this.bindMesh();
     program.use({...view, u_wire: look.wire, u_line: 0.8 * look.line, u_colour: kMesh, u_inside_colour: kMeshInside});
-    this.gl.bindVertexArray(this.meshArray.array);
     this.gl.drawArrays(this.gl.TRIANGLES, 0, this.body.mesh.triangles.length);
+  }
+
+  /// Fills what a section has cut open of a mesh that moved: nothing knows distances from it.
+  drawCap(meshProgram, capProgram, view, nothing) {
+    const {gl, body} = this;
+    if (!body.moved || !body.showsMesh || !body.mesh.closed) return;
+    gl.clearBufferiv(gl.STENCIL, 0, [0]);
+    gl.enable(gl.STENCIL_TEST);
+    gl.stencilFunc(gl.ALWAYS, 0, 255);
+    gl.stencilOpSeparate(gl.FRONT, gl.KEEP, gl.KEEP, gl.DECR_WRAP);
+    gl.stencilOpSeparate(gl.BACK, gl.KEEP, gl.KEEP, gl.INCR_WRAP);
+    gl.depthFunc(gl.ALWAYS);
+    gl.depthMask(false);
+    gl.colorMask(false, false, false, false);
+    meshProgram.use({...view, u_wire: false});
+    this.bindMesh();
+    gl.drawArrays(gl.TRIANGLES, 0, body.mesh.triangles.length);
+    gl.colorMask(true, true, true, true);
+    gl.depthMask(true);
+    gl.depthFunc(gl.LESS);
+    gl.stencilFunc(gl.NOTEQUAL, 0, 255);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.KEEP);
+    capProgram.use({...view, u_colour: kMesh});
+    gl.bindVertexArray(nothing);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.disable(gl.STENCIL_TEST);
+  }
+
+  bindMesh() {
+    const {gl, body} = this;
+    if (this.meshVertices !== body.vertices) {
+      const corners = cornersOf(body.vertices, body.mesh.triangles);
+      if (this.meshArray) {
+        gl.bindBuffer(gl.ARRAY_BUFFER, this.meshArray.buffers[0]);
+        gl.bufferSubData(gl.ARRAY_BUFFER, 0, corners);
+      }
+      this.meshArray ??= vertexArray(gl, {0: {data: corners, size: 3}});
+      this.meshVertices = body.vertices;
+    }
+    gl.bindVertexArray(this.meshArray.array);
   }
 }
 
@@ -115,7 +153,7 @@ function ellipsoidArray(gl, shapes, colours, ids) {
   });
 }
 
-function cornersOf({vertices, triangles}) {
+function cornersOf(vertices, triangles) {
   const out = new Float32Array(3 * triangles.length);
   for (let i = 0; i < triangles.length; ++i)
     for (let k = 0; k < 3; ++k) out[3 * i + k] = vertices[3 * triangles[i] + k];

@@ -7,7 +7,8 @@ const rgb = (hex) => [16, 8, 0].map((shift) => ((hex >> shift) & 255) / 255);
 
 export const kBodyColours = [rgb(0x56b4e9), rgb(0xc9b38c)];
 export const kContact = rgb(0xd55e00);
-export const kInner = rgb(0x009e73);
+export const kOuter = rgb(0xe69f00); // of covers that are told apart from inner ones, not node from node
+export const kInner = rgb(0x2b7196); // as `prolate render` has it
 export const kMesh = rgb(0xc9c7c2);
 export const kMeshInside = rgb(0x8d8a84);
 export const kWitness = rgb(0x1c2126);

@@ -66,8 +66,9 @@ export class Target {
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
       gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
-      const attachment = format === gl.DEPTH_COMPONENT24 ? gl.DEPTH_ATTACHMENT : gl.COLOR_ATTACHMENT0 + colours.length;
-      if (attachment !== gl.DEPTH_ATTACHMENT) colours.push(attachment);
+      const depths = {[gl.DEPTH_COMPONENT24]: gl.DEPTH_ATTACHMENT, [gl.DEPTH24_STENCIL8]: gl.DEPTH_STENCIL_ATTACHMENT};
+      const attachment = depths[format] ?? gl.COLOR_ATTACHMENT0 + colours.length;
+      if (!(format in depths)) colours.push(attachment);
       gl.framebufferTexture2D(gl.FRAMEBUFFER, attachment, gl.TEXTURE_2D, texture, 0);
     }
     gl.drawBuffers(colours);

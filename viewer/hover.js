@@ -1,5 +1,6 @@
 // The node under the pointer: lit up in the picture, and described beside it.
 import {idOf} from './body_layers.js';
+import {motionOf} from './deformation.js';
 import {fillFigures} from './dom.js';
 import {grouped, percent, plural, short} from './format.js';
 
@@ -48,11 +49,17 @@ export class Hover {
     const title = document.createElement('b'), list = document.createElement('dl');
     title.textContent = `Node ${grouped(nodes.slot[row])}` + (this.scene.bodies.length > 1 ? ` of ${'AB'[index]}` : '');
     list.className = 'figures';
+    const motion = body.moved && motionOf(body.deformation, row, body.coordinates);
     fillFigures(list, [
       ['level', `${nodes.level[row]}, ${below}`],
-      ['radii', radii.map((r) => short(r, 3)).join(' · ')],
-      ['volume', short(volume)],
-      ['outside volume', outside >= 0 ? `${short(outside, 3)} (${percent(outside / volume, 2)})` : undefined],
+      [motion ? 'radii at rest' : 'radii', radii.map((r) => short(r, 3)).join(' · ')],
+      ['moved by', motion ? short(Math.hypot(...motion.shift), 3) : undefined],
+      ['grown by', motion ? percent(motion.growth, 2) : undefined],
+      ['and around by', motion ? short(motion.radius, 2) : undefined],
+      ['volume', motion ? undefined : short(volume)],
+      [
+        'outside volume', outside >= 0 && !motion ? `${short(outside, 3)} (${percent(outside / volume, 2)})` : undefined
+      ],
       ['sub-volume', part >= 0 ? `${short(part, 3)} (${percent(part / body.solid_volume, 2)} of all)` : undefined],
     ]);
     this.tip.replaceChildren(title, list);

@@ -42,6 +42,10 @@ export function shortcuts(app) {
             [['I', 'inner cover in sections and wires', letter('i'), toggle('inner')]] :
             []),
   ];
+  const deformation = [
+    ['A', 'play, pause', letter('a'), () => app.togglePlay()],
+    ['Q', 'at rest', letter('q'), () => app.rest()],
+  ];
   const section = [
     ['S', 'section on or off', letter('s'), toggle('section')],
     ['X Y Z', 'across this axis', letter('x', 'y', 'z'), (e) => cut({sectionAxis: 'xyz'.indexOf(e.key.toLowerCase())})],
@@ -61,7 +65,8 @@ export function shortcuts(app) {
     ['P', 'put B back', letter('p'), () => app.resetPose()],
   ];
   return [
-    ['View', view], ['Tree', tree], ['Section', section], ...(app.scene.bodies.length > 1 ? [['Bodies', bodies]] : []),
+    ['View', view], ['Tree', tree], ['Section', section], ...(app.deforms ? [['Deformation', deformation]] : []),
+    ...(app.scene.bodies.length > 1 ? [['Bodies', bodies]] : []),
     ['This sheet', [['?', 'open and close', typed('?'), () => app.toggleHelp()]]]
   ];
 }

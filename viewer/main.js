@@ -1,5 +1,6 @@
 // The viewer: reads the scene, shows it, and listens.
 import {Camera} from './camera.js';
+import {Player} from './deformation.js';
 import {element} from './dom.js';
 import {Encounter} from './encounter.js';
 import {Hover} from './hover.js';
@@ -15,26 +16,39 @@ const kRest = 160; // milliseconds without a change before edges are made smooth
 const kSlowest = 1500; // and what a smooth picture may take to be worth it
 const kSluggish = 70; // and between pictures that follow each other
 
+const kManyNodes = 256; // to begin with: more are hard to tell apart
+
+/// The finest level that has at most so many nodes.
+function finestLevel(body, nodes) { return Math.max(0, body.levels.findLastIndex((level) => level.cut <= nodes)); }
+
 class App {
   constructor() {
     const canvas = element('canvas');
     const scene = this.scene = readScene(), two = scene.bodies.length > 1;
     this.levelCount = Math.max(...scene.bodies.map((body) => body.levels.length));
-    const hasMesh = scene.bodies.some((body) => body.mesh);
+    const hasMesh = scene.bodies.some((body) => body.mesh), hasInner = scene.bodies.some((body) => body.inner);
+    this.deforms = !two && Boolean(scene.bodies[0].deformation);
     this.state = new State({
-      level: two ? this.levelCount - 1 : Math.min(2, this.levelCount - 1),
-      colour: two ? 'body' : 'branch',
-      coverOpacity: 1,
+      level: two ? this.levelCount - 1 : finestLevel(scene.bodies[0], kManyNodes),
+      colour: two  ? 'body' :
+          hasInner ? 'covers' :
+                     'branch',
+      coverOpacity: this.deforms && hasMesh ? 0.5 : 1, // so that the mesh is seen to move within
       coverWire: false,
       meshOpacity: hasMesh ? 1 : 0,
       meshWire: false,
-      inner: scene.bodies.some((body) => body.inner),
-      section: false,
+      inner: hasInner,
+      section: hasInner && !two, // elsewhere the outer cover hides the inner one
       sectionAxis: scene.up.endsWith('y') ? 2 : 1,
       sectionFlip: scene.up.endsWith('z'),
       sectionAt: 0.5,
+      coordinates: scene.bodies[0].coordinates,
+      playing: false,
       drag: 'move',
       hover: 0,
+    });
+    this.state.onChange((changed) => { // the first to hear: others ask the body
+      if (changed.includes('coordinates')) scene.bodies[0].deform(this.state.coordinates);
     });
     this.camera = new Camera(scene.up);
     if (two) { // beside the first as one sees it, so that a drag across the picture brings them together
@@ -50,6 +64,8 @@ class App {
       hover: (x, y) => this.hover.at(x, y),
       leave: () => this.hover.hide(),
     });
+    if (this.deforms)
+      this.player = new Player(scene.bodies[0].deformation.ranges, (coordinates) => this.state.set({coordinates}));
     this.panel = new Panel(this);
     const groups = shortcuts(this);
     fillSheet(element('help-groups'), groups);
@@ -99,6 +115,18 @@ class App {
     this.scene.bodies[1].pose = this.scene.startPose;
     this.poseChanged();
   }
+
+  togglePlay() {
+    const playing = !this.state.playing;
+    this.player[playing ? 'play' : 'pause']();
+    this.state.set({playing});
+  }
+  /// Stops, and takes these coordinates.
+  deform(coordinates) {
+    this.player.pause();
+    this.state.set({playing: false, coordinates});
+  }
+  rest() { this.deform(this.state.coordinates.map(() => 0)); }
 
   colourings() {
     return [...document.querySelectorAll('[data-state=colour] button')]

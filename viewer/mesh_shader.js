@@ -40,3 +40,30 @@ void main() {
   // Between wires nothing is seen, but what lies behind stays hidden: the depth is written.
   o_colour = u_wire ? vec4(vec3(0.25), line) : stored(shade(colour, n, u_key, u_sky));
 }`;
+
+// Where a section cuts the solid: the stencil holds, for each pixel, how often the mesh is left minus how often it is
+// entered behind the plane, which is the winding number of the plane's point.
+export const kCapVertex = /* glsl */ `
+precision highp float;
+uniform vec3 u_right, u_up, u_forward;
+out vec3 v_direction;
+void main() {
+  vec2 at = 2.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1) - 1.0;
+  v_direction = u_forward + at.x * u_right + at.y * u_up;
+  gl_Position = vec4(at, 0.0, 1.0);
+}`;
+
+export const kCapFragment = /* glsl */ `
+precision highp float;
+in vec3 v_direction;
+layout(location = 0) out vec4 o_colour;
+uniform vec3 u_eye, u_colour;
+uniform vec2 u_depth;
+uniform vec4 u_section;
+${kShading}
+void main() {
+  float t = (u_section.w - dot(u_section.xyz, u_eye)) / dot(u_section.xyz, v_direction);
+  if (t <= 0.0) discard;
+  gl_FragDepth = u_depth.x - u_depth.y / t - 0.5 * SECTION_DEPTH; // before what ellipsoids show there
+  o_colour = stored(0.9 * linear(u_colour)); // as they show the solid
+}`;

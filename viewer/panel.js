@@ -17,14 +17,19 @@ export class Panel {
     this.check('cover-wire', 'coverWire');
     this.check('mesh-wire', 'meshWire');
     this.check('section-on', 'section');
+    this.check('inner-on', 'inner');
     element('section-flip')
         .addEventListener('click', () => state.set({section: true, sectionFlip: !state.sectionFlip}));
     element('reset-view').addEventListener('click', () => app.resetView());
     element('help-open').addEventListener('click', () => app.toggleHelp());
     for (const group of document.querySelectorAll('[data-state]')) this.choice(group);
 
+    if (app.deforms) this.modes();
     const hasMesh = scene.bodies.some((body) => body.mesh), hasDistances = scene.bodies.some((body) => body.lattice);
     element('mesh-row').hidden = !hasMesh;
+    const hasInner = scene.bodies.some((body) => body.inner);
+    element('inner-row').hidden = !hasInner;
+    this.button('colour', 'covers').hidden = !hasInner;
     this.button('colour', 'body').hidden = scene.bodies.length < 2;
     this.button('colour', 'outside').disabled = !hasDistances;
     if (!hasDistances)
@@ -47,6 +52,27 @@ export class Panel {
     element('subtitle').textContent = bodies.length > 1 ?
         bodies.map((body, i) => `${'AB'[i]}: ${plain(body)}`).join('; ') :
         kind(bodies[0]) + (bodies[0].mesh ? ` · ${grouped(bodies[0].mesh.triangles.length / 3)} triangles` : '');
+  }
+
+  // A slider for each mode, over its range.
+  modes() {
+    const {app} = this, {deformation} = app.scene.bodies[0];
+    element('deformation').hidden = false;
+    element('modes').append(...Array.from(deformation.ranges, (range, m) => {
+      const row = document.createElement('div'), label = document.createElement('label'),
+            input = document.createElement('input'), text = document.createElement('output');
+      row.className = 'row';
+      Object.assign(label, {htmlFor: `mode-${m}`, textContent: `mode ${m + 1}`});
+      Object.assign(input, {id: `mode-${m}`, type: 'range', min: -range, max: range, step: range / 100, value: 0});
+      input.addEventListener('input', () => {
+        const at = Math.abs(input.valueAsNumber) < range / 200 ? 0 : input.valueAsNumber;
+        app.deform(app.state.coordinates.map((x, i) => (i === m ? at : x)));
+      });
+      row.append(label, input, text);
+      return row;
+    }));
+    element('play').addEventListener('click', () => app.togglePlay());
+    element('at-rest').addEventListener('click', () => app.rest());
   }
 
   range(id, name, read, also = {}) {
@@ -77,11 +103,15 @@ export class Panel {
     };
     for (const [id, value] of Object.entries(values)) element(id).value = value;
     for (const [id, value] of [
-             ['cover-wire', state.coverWire], ['mesh-wire', state.meshWire], ['section-on', state.section]])
+             ['cover-wire', state.coverWire], ['mesh-wire', state.meshWire], ['section-on', state.section],
+             ['inner-on', state.inner]])
       element(id).checked = value;
     for (const group of document.querySelectorAll('[data-state]'))
       for (const button of group.children)
         button.setAttribute('aria-checked', String(state[group.dataset.state]) === button.dataset.value);
+
+    const {moved} = scene.bodies[0];
+    if (this.app.deforms) this.refreshModes();
 
     const levels = scene.bodies.map((body) => body.levels[Math.min(state.level, body.levels.length - 1)]);
     const count = levels.map((level) => grouped(level.cut)).join(' + ');
@@ -90,17 +120,35 @@ export class Panel {
     const words = levels.length > 1 ? count : plural(levels[0].cut, 'ellipsoid');
     element('level-text').replaceChildren(text, ` of ${this.app.levelCount - 1} · ${words}`);
     if (scene.bodies.length === 1) {
-      const {outside_ratio: ratio, percent_of_diagonal: far} = levels[0];
-      fillFigures(element('level-figures'), [
+      const {outside_ratio: ratio, percent_of_diagonal: far} = levels[0], {inner} = scene.bodies[0];
+      const within = inner && inner.cuts[Math.min(state.level, inner.levels - 1)];
+      fillFigures(element('level-figures'), moved ? [] : [
+        // which are of the body at rest
+        ['inside the solid', within && `${plural(within.nodes, 'ellipsoid')}, ${percent(within.share)} of it`],
         ['outside volume', ratio === null ? undefined : `${percent(ratio)} of the solid`],
         ['farthest out', far.hausdorff_max === null ? undefined : `${short(far.hausdorff_max, 3)} % of diagonal`],
         ['on average', far.hausdorff_mean === null ? undefined : `${short(far.hausdorff_mean, 3)} % of diagonal`],
       ]);
     }
-    element('legend').hidden = state.colour !== 'outside';
+    element('legend-covers').hidden = state.colour !== 'covers';
+    element('legend').hidden = state.colour !== 'outside' || moved;
     const end = this.app.rampEnd();
     [...element('legend-ticks').children].forEach((tick, i) => {
       tick.textContent = (i === 2 ? '≥ ' : '') + short(end * i / 2, 2);
     });
+  }
+
+  refreshModes() {
+    const {state, scene} = this.app, [{moved, mesh, showsMesh, levels}] = scene.bodies;
+    [...element('modes').children].forEach((row, m) => {
+      row.children[1].value = state.coordinates[m];
+      row.children[2].textContent = short(state.coordinates[m], 3);
+    });
+    element('play').textContent = state.playing ? 'pause' : 'play';
+    const words = ['Each ellipsoid holds its part of the mesh at all coordinates within these ranges.'];
+    if (moved && state.level < levels.length - 1) words.push('Above the last level they hold all leaves below, too.');
+    if (moved && mesh && !showsMesh) words.push('To see the mesh move, name its modes: view --modes.');
+    if (moved && state.colour === 'outside') words.push('Distances are known at rest only.');
+    element('deformation-note').textContent = words.join(' ');
   }
 }

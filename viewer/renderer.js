@@ -5,7 +5,7 @@ import {ramp} from './colours.js';
 import {kCoverFragment, kCoverVertex} from './cover_shader.js';
 import {bindTexture, Program, Target} from './gl.js';
 import {Marks} from './marks.js';
-import {kMeshFragment, kMeshVertex} from './mesh_shader.js';
+import {kCapFragment, kCapVertex, kMeshFragment, kMeshVertex} from './mesh_shader.js';
 import {kPictureFragment, kScalingFragment, kWholeVertex} from './picture_shader.js';
 import {add, directionToBody, dot, normalised, scaled, toBody} from './vector.js';
 
@@ -13,6 +13,7 @@ const kMostPixels = 9e6; // of a smooth picture
 const kSources = {
   cover: [kCoverVertex, kCoverFragment],
   mesh: [kMeshVertex, kMeshFragment],
+  cap: [kCapVertex, kCapFragment],
   picture: [kWholeVertex, kPictureFragment],
   scaling: [kWholeVertex, kScalingFragment],
 };
@@ -27,7 +28,7 @@ export class Renderer {
     this.layers = scene.bodies.map((body, i) => new BodyLayers(gl, body, i));
     this.programs = {};
     this.cover = new Target(gl, {colour: gl.RGBA8, id: gl.R32UI, depth: gl.DEPTH_COMPONENT24});
-    this.mesh = new Target(gl, {colour: gl.RGBA8, depth: gl.DEPTH_COMPONENT24});
+    this.mesh = new Target(gl, {colour: gl.RGBA8, depth: gl.DEPTH24_STENCIL8});
     this.other = new Target(gl, {colour: gl.RGBA8}); // the picture, if it is not drawn at the screen's size
     this.marks = new Marks(gl);
     this.ramp = gl.createTexture();
@@ -87,14 +88,17 @@ export class Renderer {
             (switches) => this.program('cover', switches), this.viewOf(layers.body, lens, look.section), look);
     this.mesh.bind();
     gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
-    gl.clearBufferfv(gl.DEPTH, 0, [1]);
+    gl.clearBufferfi(gl.DEPTH_STENCIL, 0, 1, 0);
     // A proved cover hides its mesh.
     const hidden =
         look.coverOpacity === 1 && !look.coverWire && !look.section && this.bodies.every((body) => body.covers);
     if (look.meshOpacity > 0 && !hidden)
-      for (const layers of this.layers)
-        layers.drawMesh(
-            this.program('mesh'), this.viewOf(layers.body, lens, look.section), {wire: look.meshWire, line});
+      for (const layers of this.layers) {
+        const view = this.viewOf(layers.body, lens, look.section);
+        layers.drawMesh(this.program('mesh'), view, {wire: look.meshWire, line});
+        if (look.section && dot(look.section.normal, lens.eye) > look.section.offset)
+          layers.drawCap(this.program('mesh'), this.program('cap'), view, this.nothing);
+      }
     this.compose(look);
   }
 

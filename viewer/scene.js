@@ -1,4 +1,5 @@
 // The scene that `prolate view` has put into the page: a description in JSON, and a block of numbers that it refers to.
+import {movedEllipsoids, movedVertices} from './deformation.js';
 import {element} from './dom.js';
 import {add, clamp, directionToBody, dot, ends, kIdentity, scaled, subtract, toWorld} from './vector.js';
 
@@ -41,10 +42,24 @@ class Body {
     };
     Object.assign(this, resolve(description));
     this.pose = kIdentity;
+    this.version = 0; // another one for each change of shape
     // What the camera looks at: all but the root, which by far sticks out the most; and what it must not cut off.
     const rows = Array.from(this.nodes.slot.keys());
+    this.deform(Array.from(this.deformation?.ranges ?? [], () => 0));
     this.box = this.boxOf(rows.length > 1 ? rows.slice(1) : rows);
-    this.reach = this.boxOf(rows);
+  }
+
+  /// Moves the body by its modes: what `ellipsoid` and `vertices` hold from now on. At rest, ellipsoids are those of
+  /// the levels; else the bounds, which queries of deforming bodies ask.
+  deform(q) {
+    const {deformation, mesh, nodes} = this, displacements = deformation?.displacements;
+    this.coordinates = q;
+    this.moved = q.some((x) => x !== 0);
+    this.ellipsoid = this.moved ? movedEllipsoids(deformation, q, nodes.slot.keys()) : nodes.ellipsoid;
+    this.vertices = this.moved && displacements ? movedVertices(mesh.vertices, displacements, q) : mesh?.vertices;
+    this.showsMesh = Boolean(mesh && (!this.moved || displacements));
+    this.reach = this.boxOf(Array.from(nodes.slot.keys()));
+    ++this.version;
   }
 
   get nodeCount() { return this.nodes.slot.length; }
@@ -53,13 +68,13 @@ class Body {
   cut(level) { return cutOf(this.nodes, Math.min(level, this.levels.length - 1)); }
   innerCut(level) { return cutOf(this.inner.nodes, Math.min(level, this.inner.levels - 1)); }
 
-  center(row) { return Array.from(this.nodes.ellipsoid.subarray(9 * row, 9 * row + 3)); }
+  center(row) { return Array.from(this.ellipsoid.subarray(9 * row, 9 * row + 3)); }
 
   /// Axis-aligned box of these nodes' ellipsoids, in the body's frame.
   boxOf(rows) {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     for (const row of rows) {
-      const e = this.nodes.ellipsoid.subarray(9 * row, 9 * row + 9);
+      const e = this.ellipsoid.subarray(9 * row, 9 * row + 9);
       const half = [e[3], Math.hypot(e[4], e[5]), Math.hypot(e[6], e[7], e[8])];
       for (let i = 0; i < 3; ++i) {
         low[i] = Math.min(low[i], e[i] - half[i]);
@@ -94,11 +109,25 @@ class Body {
     return fromHalf(distance[(k * size[1] + j) * size[0] + i]);
   }
 
-  /// How far each ellipsoid but the root's reaches along a direction of the world: [[least, most], ...].
+  /// How far each ellipsoid but the root's reaches along a direction of the world: [[least, most], ...]; of a body that
+  /// deforms, at the ends of each mode's range, too, those of few nodes.
   extents(direction) {
+    const {nodes, deformation, coordinates} = this,
+                               rows = Array.from(nodes.slot.keys()).slice(this.nodeCount > 1 ? 1 : 0);
+    const out = this.extentsOf(nodes.ellipsoid, rows, direction);
+    const level = this.levels.findLastIndex((one) => one.cut <= 64),
+          few = deformation ? this.cut(Math.max(1, level)) : [];
+    for (const end of few.length > 0 ? [-1, 1] : [])
+      for (let m = 0; m < coordinates.length; ++m) {
+        const q = coordinates.map((_, i) => (i === m ? end * deformation.ranges[m] : 0));
+        out.push(...this.extentsOf(movedEllipsoids(deformation, q, few), few, direction));
+      }
+    return out;
+  }
+  extentsOf(ellipsoids, rows, direction) {
     const d = directionToBody(this.pose, direction), start = dot(direction, this.pose.translation), out = [];
-    for (let row = this.nodeCount > 1 ? 1 : 0; row < this.nodeCount; ++row) {
-      const [x, y, z, l11, l21, l22, l31, l32, l33] = this.nodes.ellipsoid.subarray(9 * row, 9 * row + 9);
+    for (const row of rows) {
+      const [x, y, z, l11, l21, l22, l31, l32, l33] = ellipsoids.subarray(9 * row, 9 * row + 9);
       const middle = start + d[0] * x + d[1] * y + d[2] * z;
       const half = Math.hypot(l11 * d[0] + l21 * d[1] + l31 * d[2], l22 * d[1] + l32 * d[2], l33 * d[2]);
       out.push([middle - half, middle + half]);

@@ -20,16 +20,16 @@ constexpr double kFineEnough = 0.001;  // of the diagonal: of a hull's clearance
 constexpr size_t kMostParts = 100'000; // of its surface, to look at
 
 // A part of a hull's surface.
-struct Part {
+struct SurfacePart {
     std::array<glm::dvec3, 3> corners;
     double bound; // no point of it is farther from the solid
-    bool operator<(const Part& other) const { return bound < other.bound; }
+    bool operator<(const SurfacePart& other) const { return bound < other.bound; }
 };
 
 // How far a surface sticks out of the solid, to kFineEnough: the part that may be farthest is cut in four, until it is
 // no farther than what is known. The distance changes by no more than one moves.
 double clearance_of(MeshView surface, const Solid& solid) {
-    std::priority_queue<Part> parts;
+    std::priority_queue<SurfacePart> parts;
     double known = 0;
     const auto add = [&](const std::array<glm::dvec3, 3>& c) {
         const glm::dvec3 middle = (c[0] + c[1] + c[2]) / 3.0;

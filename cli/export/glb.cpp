@@ -24,7 +24,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942; // "glTF", "JSON", "BIN\0"
+constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A,
+                   kBinaryChunk = 0x004E4942; // "glTF", "JSON", "BIN\0"
 enum Component { kUint16 = 5123, kFloat = 5126 };
 enum Target { kVertices = 34962, kIndices = 34963 };
 
@@ -143,7 +144,7 @@ std::string as_glb(std::span<const Piece> pieces, uint32_t segments, Facets face
     std::string text = gltf.dump();
     pad(text, ' ');
     std::string out;
-    append_little_endian(out, kMagic);
+    append_little_endian(out, kGlbMagic);
     append_little_endian(out, uint32_t{2}); // version
     append_little_endian(out, static_cast<uint32_t>(12 + 8 + text.size() + 8 + binary.size()));
     append_little_endian(out, static_cast<uint32_t>(text.size()));

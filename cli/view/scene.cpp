@@ -23,6 +23,10 @@ std::array<uint8_t, 3> srgb(const Oklch& colour) {
     return out;
 }
 
+void append(std::vector<float>& to, const Ellipsoid& e) {
+    to.insert(to.end(), {e.center.x, e.center.y, e.center.z, e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
+}
+
 // The tables of the nodes, one row each, in order of slots.
 nlohmann::ordered_json nodes_of(const TreeView& tree, NumberBlock& numbers) {
     std::vector<uint32_t> slot;
@@ -37,8 +41,7 @@ nlohmann::ordered_json nodes_of(const TreeView& tree, NumberBlock& numbers) {
             children.push_back(static_cast<uint8_t>(tree.children(node).count));
             triangles.push_back(static_cast<uint8_t>(tree.triangles(node).count));
             for (const uint8_t channel : srgb(colours[node])) colour.push_back(channel);
-            ellipsoid.insert(ellipsoid.end(),
-                             {e.center.x, e.center.y, e.center.z, e.l11, e.l21, e.l22, e.l31, e.l32, e.l33});
+            append(ellipsoid, e);
             for (const double radius : principal_axes(e).radii) radii.push_back(static_cast<float>(radius));
         });
     return {{"slot", numbers.add(slot)},         {"level", numbers.add(level)},
@@ -67,8 +70,24 @@ std::vector<float> to_floats(const std::vector<double>& values) {
     return out;
 }
 
+// How the nodes move (viewer/deformation.js), in the order of nodes_of().
+nlohmann::ordered_json deformation_of(const TreeView& tree, const Deformation& modes, NumberBlock& numbers) {
+    std::vector<float> ranges, bound, motions;
+    for (uint32_t m = 0; m < modes.mode_count(); ++m) ranges.push_back(modes.range(m));
+    for (uint32_t l = 0; l < tree.level_count(); ++l)
+        tree.for_each_node(l, [&](uint32_t node) {
+            append(bound, tree.bound(node));
+            for (uint32_t m = 0; m < modes.mode_count(); ++m) {
+                const Deformation::Motion motion = modes.motion(node, m);
+                for (const double x : {motion.shift[0], motion.shift[1], motion.shift[2], motion.growth, motion.radius})
+                    motions.push_back(static_cast<float>(x));
+            }
+        });
+    return {{"ranges", numbers.add(ranges)}, {"bound", numbers.add(bound)}, {"motions", numbers.add(motions)}};
+}
+
 // Half floats, in percent of the diagonal: 0.05 % of each value is as good as a picture gets.
-nlohmann::ordered_json lattice_of(const DistanceLattice& lattice, double diagonal, NumberBlock& numbers) {
+nlohmann::ordered_json distances_of(const DistanceLattice& lattice, double diagonal, NumberBlock& numbers) {
     std::vector<uint16_t> halves;
     for (const float distance : lattice.distance)
         halves.push_back(glm::packHalf1x16(static_cast<float>(std::clamp(100 * distance / diagonal, -1e4, 1e4))));
@@ -108,15 +127,24 @@ std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBloc
         out["levels"].push_back(std::move(level));
     }
     out["nodes"] = nodes_of(tree, numbers);
-    if (const auto inner = tree.inner())
+    if (const auto inner = tree.inner()) {
         out["inner"] = {{"levels", inner->level_count()}, {"nodes", nodes_of(*inner, numbers)}};
+        for (uint32_t l = 0; l < inner->level_count(); ++l)
+            out["inner"]["cuts"].push_back(
+                {{"nodes", cut_size(*inner, l)},
+                 {"share", inner->level(l).union_volume / inner->bake_info().solid_volume}});
+    }
+    if (const auto modes = tree.deformation()) {
+        out["deformation"] = deformation_of(tree, *modes, numbers);
+        if (!body.displacements.empty()) out["deformation"]["displacements"] = numbers.add(body.displacements);
+    }
     if (body.mesh) {
         out["mesh"] = mesh_of(body.mesh->mesh, numbers);
         out["mesh"]["closed"] = body.mesh->report.closed;
         const Solid solid(body.mesh->mesh.view(), body.mesh->report.closed);
         const auto lattice = distance_lattice(tree, *body.mesh, solid, kLatticeNodes, progress);
         if (!lattice) return {};
-        if (info.diagonal > 0) out["lattice"] = lattice_of(*lattice, info.diagonal, numbers);
+        if (info.diagonal > 0) out["lattice"] = distances_of(*lattice, info.diagonal, numbers);
         if (!info.exact) {
             const NodeFigures figures = node_figures(tree, *body.mesh, solid, *lattice);
             out["nodes"]["outside_volume"] = numbers.add(to_floats(figures.outside_volume));

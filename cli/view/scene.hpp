@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace prolate::cli {
 
@@ -18,6 +19,8 @@ struct ViewBody {
     TreeView tree;
     std::optional<CleanMesh> mesh;
     bool own_mesh = true; ///< the mesh is the one that the tree was baked from
+    /// What a unit of each mode adds to each vertex of `mesh`, M by V by 3, metres; empty if that is not known.
+    std::vector<float> displacements = {};
 };
 
 /// Describes one body, and puts its numbers into `numbers`. `with_file`: the bytes of the tree too, for queries.

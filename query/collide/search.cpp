@@ -38,7 +38,7 @@ namespace {
 
 // Scratch::Entry::flags: which of the two nodes is to be opened, whether the other is a leaf, and whether slabs
 // have said what they can.
-constexpr uint32_t kOpenB = 1, kOtherIsLeaf = 2, kInOnePlane = 4;
+constexpr uint32_t kOpensB = 1, kOtherIsLeaf = 2, kInOnePlane = 4;
 
 // Nodes of which p / (a + b) is greater may well be separated along n by their hulls, or triangles; below, a closer
 // look costs more than it saves.
@@ -65,11 +65,11 @@ private:
         // The roots, as if B's were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         pair_tests_ = 1;
-        if (test_all(kOpenB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
+        if (test_all(kOpensB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
         while (size_ > 0) {
             auto e = stack_[--size_];
             if (kSifts && s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
-            const uint32_t open = e.flags & kOpenB;
+            const uint32_t open = e.flags & kOpensB;
             const uint32_t node = open != 0 ? e.node_b : e.node_a, other = open != 0 ? e.node_a : e.node_b;
             const Side& side = sides_[open];
             if (node >= side.limit_from) { // max_level ends the traversal
@@ -117,8 +117,8 @@ private:
 
     // Are the hulls of a lane's node and of the other tree's node separated along n?
     HWY_NOINLINE bool hulls_separated(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
-        const std::byte *const of_other = hull_at(sides_[open ^ kOpenB], other), *const own =
-                                                                                     hull_at(sides_[open], node);
+        const std::byte *const of_other = hull_at(sides_[open ^ kOpensB], other), *const own =
+                                                                                      hull_at(sides_[open], node);
         const auto reach = [](const std::byte* hull, float x, float y, float z, float width) {
             return hull != nullptr ? hull_reach(hull, x, y, z, width) : width;
         };
@@ -158,7 +158,7 @@ private:
         return left - std::min(left, pair_tests_ - s_.stats.pair_tests);
     }
 
-    // One block, B's if kOpenB is given, against a node of the other tree: decides on the leaves that meet, and pushes
+    // One block, B's if kOpensB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
     HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t of_parent) {
         const uint32_t other_is_leaf = of_parent & kOtherIsLeaf;
@@ -167,7 +167,7 @@ private:
         const std::byte* const block = side.block(first);
         ++block_tests_;
         side.deepest = std::max(side.deepest, first + count - 1);
-        const Single& single = side.place(sides_[open ^ kOpenB], other).single;
+        const Single& single = side.place(sides_[open ^ kOpensB], other).single;
         const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
         uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
         if (meet == 0) return false;
@@ -190,7 +190,7 @@ private:
             meet &= ~leaves;
         }
         const uint32_t opened = ~leaves & (other_is_leaf != 0 ? 0xff : larger);
-        const uint32_t if_opened = open | other_is_leaf | inherited, if_other_opened = (open ^ kOpenB) | inherited;
+        const uint32_t if_opened = open | other_is_leaf | inherited, if_other_opened = (open ^ kOpensB) | inherited;
         const uint32_t before = size_;
         uint32_t deepest = before;
         float least = HUGE_VALF;

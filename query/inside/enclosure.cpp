@@ -10,10 +10,10 @@
 namespace prolate::query {
 namespace {
 
-class Enclosure {
+class InsideSearch {
 public:
-    Enclosure(const TreeView& outer, const TreeView& inner, const RelativePose& to_outer, QueryStats& stats,
-              uint64_t most_tests)
+    InsideSearch(const TreeView& outer, const TreeView& inner, const RelativePose& to_outer, QueryStats& stats,
+                 uint64_t most_tests)
         : outer_(outer), inner_(inner), to_outer_(to_outer), stats_(stats), most_tests_(most_tests) {}
 
     Verdict look() const {
@@ -68,8 +68,8 @@ private:
 
 Verdict look_inside(const TreeView& a, const TreeView& b, const RelativePose& b_to_a, QueryStats& stats,
                     uint64_t most_tests) noexcept {
-    const Verdict first = Enclosure(a, b, b_to_a, stats, most_tests).look();
-    return first != Verdict::separated ? first : Enclosure(b, a, inverse(b_to_a), stats, most_tests).look();
+    const Verdict first = InsideSearch(a, b, b_to_a, stats, most_tests).look();
+    return first != Verdict::separated ? first : InsideSearch(b, a, inverse(b_to_a), stats, most_tests).look();
 }
 
 } // namespace prolate::query

@@ -54,8 +54,9 @@ double motion(const LocalBounds& local, const Anchor& from, const Anchor& to,
               double rounding = kSeparationMargin) noexcept;
 
 /// Of all points: where nothing can be said.
-inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
-inline constexpr Bounds kEverything{{-kInfinity, -kInfinity, -kInfinity}, {kInfinity, kInfinity, kInfinity}};
+inline constexpr float kInfiniteFloat = std::numeric_limits<float>::infinity();
+inline constexpr Bounds kEverything{{-kInfiniteFloat, -kInfiniteFloat, -kInfiniteFloat},
+                                    {kInfiniteFloat, kInfiniteFloat, kInfiniteFloat}};
 
 bool is_finite(const Bounds& box) noexcept;
 float round_down(double x) noexcept;

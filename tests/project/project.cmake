@@ -49,6 +49,15 @@ if(PROLATE_BUILD_BUILDER)
 endif()
 script_test(project.headers_selftest headers_selftest.cmake -D CXX=${CMAKE_CXX_COMPILER} -D WORK=${scratch}/headers)
 
+# Names local to a .cpp that hide those of headers.
+find_package(Python3 COMPONENTS Interpreter)
+if(Python3_FOUND)
+  add_test(NAME project.hidden_names COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/project/hidden_names.py
+    ${PROJECT_SOURCE_DIR})
+  add_test(NAME project.hidden_names_selftest COMMAND ${Python3_EXECUTABLE} -B
+    ${CMAKE_CURRENT_SOURCE_DIR}/project/hidden_names_selftest.py ${PROJECT_SOURCE_DIR})
+endif()
+
 # Names of files in comments and documents.
 script_test(project.pointers pointers.cmake -D ROOT=${PROJECT_SOURCE_DIR})
 script_test(project.pointers_selftest pointers_selftest.cmake -D WORK=${scratch}/pointers)

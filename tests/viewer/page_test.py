@@ -1,6 +1,7 @@
 """What the tests of pages share: meshes, the command, a window, and looks at it."""
 import math
 import os
+import struct
 import subprocess
 import sys
 import unittest
@@ -37,6 +38,22 @@ def bumpy(around=48, down=24, size=1):
         for j in range(1, down - 1):
             lines.append(f"f {index(i, j)} {index(i, j + 1)} {index(i + 1, j + 1)} {index(i + 1, j)}")
     return "\n".join(lines) + "\n"
+
+
+def write_modes(name, modes):
+    """An .npy file of modes: for each a list of displacements, one a vertex."""
+    header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({len(modes)}, {len(modes[0])}, 3), }}"
+    header += " " * (-(len(header) + 11) % 64) + "\n"
+    with open(path(name), "wb") as file:
+        file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode())
+        for mode in modes:
+            for displacement in mode:
+                file.write(struct.pack("<3f", *displacement))
+
+
+def vertices(mesh):
+    """Those of the text of an OBJ."""
+    return [tuple(map(float, line.split()[1:])) for line in mesh.splitlines() if line.startswith("v ")]
 
 
 def run(*arguments):

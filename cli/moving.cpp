@@ -1,0 +1,69 @@
+#include "cli/moving.hpp"
+
+#include "cli/bake/modes_file.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <map>
+
+namespace prolate::cli {
+namespace {
+
+std::array<float, 3> place_of(const Vec3& v) {
+    return {v.x, v.y, v.z};
+}
+
+} // namespace
+
+std::vector<float> displacements_of(const TreeView& exact_tree) {
+    std::vector<float> out;
+    const Deformation modes = *exact_tree.deformation();
+    for (uint32_t m = 0; m < modes.mode_count(); ++m)
+        for (uint32_t v = 0; v < modes.point_count(); ++v) {
+            const Vec3 u = modes.displacement(v, m);
+            out.insert(out.end(), {u.x, u.y, u.z});
+        }
+    return out;
+}
+
+Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& as_read,
+                                             const std::vector<Vec3>& vertices, const std::string& modes_path) {
+    const auto deformation = tree.deformation();
+    if (!deformation)
+        return Failure{kUsage, modes_path, "the tree does not deform", "bake it with these --modes, or leave them out"};
+    std::vector<float> ranges;
+    for (uint32_t m = 0; m < deformation->mode_count(); ++m) ranges.push_back(deformation->range(m));
+    auto modes = read_modes(modes_path, ranges, as_read.placement.scale);
+    if (!modes) return modes.error();
+    const auto proof = verify_modes(tree, as_read.view(), modes->view());
+    if (!proof) return failure_of(modes_path, proof.error());
+    if (!proof->proved)
+        return Failure{kBadInput, modes_path,
+                       fmt::format("mode {} is not one that the tree was baked with", proof->mode + 1),
+                       "give the file that bake had"};
+    // All that are in one place move alike: the proof has seen to it.
+    std::map<std::array<float, 3>, size_t> source;
+    for (const Triangle& t : as_read.triangles)
+        for (const uint32_t corner : t) source.emplace(place_of(as_read.vertices[corner]), corner);
+    std::vector<float> out;
+    for (size_t m = 0; m < ranges.size(); ++m)
+        for (const Vec3& v : vertices) {
+            const float* u = &modes->displacements[3 * (m * as_read.vertices.size() + source.at(place_of(v)))];
+            out.insert(out.end(), u, u + 3);
+        }
+    return out;
+}
+
+std::vector<Vec3> moved_vertices(const std::vector<Vec3>& vertices, const std::vector<float>& displacements,
+                                 const std::vector<float>& q) {
+    std::vector<Vec3> out = vertices;
+    for (size_t m = 0; m < q.size(); ++m)
+        for (size_t v = 0; v < out.size(); ++v) {
+            const float* u = &displacements[3 * (m * out.size() + v)];
+            out[v].x += q[m] * u[0], out[v].y += q[m] * u[1], out[v].z += q[m] * u[2];
+        }
+    return out;
+}
+
+} // namespace prolate::cli

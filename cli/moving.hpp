@@ -1,0 +1,27 @@
+// How the mesh of a tree that deforms moves.
+#pragma once
+
+#include "cli/failure.hpp"
+
+#include <prolate/mesh.hpp>
+#include <prolate/tree.hpp>
+
+#include <string>
+#include <vector>
+
+namespace prolate::cli {
+
+/// What a unit of each mode adds to each vertex of an exact tree that deforms: M by V by 3, metres.
+std::vector<float> displacements_of(const TreeView& exact_tree);
+
+/// The same of `vertices`, those of the mesh that the tree was baked from, cleaned; after verify_modes() has proved
+/// that the tree holds them. `as_read` is the mesh before it was cleaned. Fails where the tree has no deformation, or
+/// that of other modes.
+Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& as_read,
+                                             const std::vector<Vec3>& vertices, const std::string& modes_path);
+
+/// Each vertex at x + sum of q times its displacements.
+std::vector<Vec3> moved_vertices(const std::vector<Vec3>& vertices, const std::vector<float>& displacements,
+                                 const std::vector<float>& q);
+
+} // namespace prolate::cli
