@@ -130,9 +130,8 @@ std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBloc
     if (const auto inner = tree.inner()) {
         out["inner"] = {{"levels", inner->level_count()}, {"nodes", nodes_of(*inner, numbers)}};
         for (uint32_t l = 0; l < inner->level_count(); ++l)
-            out["inner"]["cuts"].push_back(
-                {{"nodes", cut_size(*inner, l)},
-                 {"share", inner->level(l).union_volume / inner->bake_info().solid_volume}});
+            out["inner"]["cuts"].push_back({{"nodes", cut_size(*inner, l)},
+                                            {"share", inner->level(l).union_volume / inner->bake_info().solid_volume}});
     }
     if (const auto modes = tree.deformation()) {
         out["deformation"] = deformation_of(tree, *modes, numbers);
