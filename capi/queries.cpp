@@ -48,6 +48,13 @@ private:
     size_t count_ = 0;
 };
 
+prolate_collide_result result_of(const CollideResult& r) {
+    auto out = fresh<prolate_collide_result>();
+    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed;
+    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
+    return out;
+}
+
 prolate_distance_result result_of(const DistanceResult& r) {
     auto out = fresh<prolate_distance_result>();
     out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed, out.lower = r.lower, out.upper = r.upper;
@@ -55,6 +62,24 @@ prolate_distance_result result_of(const DistanceResult& r) {
     out.normal = same<prolate_vec3>(r.normal);
     out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
     return out;
+}
+
+prolate_raycast_result result_of(const RaycastResult& r) {
+    auto out = fresh<prolate_raycast_result>();
+    out.verdict = verdict_of(r.verdict), out.t = r.t, out.clear = r.clear;
+    out.point = same<prolate_vec3>(r.point), out.normal = same<prolate_vec3>(r.normal);
+    out.node = r.node, out.triangle = r.triangle, out.stats = stats_of(r.stats);
+    return out;
+}
+
+bool has_coordinates(const prolate_deformed_body& body) {
+    return body.q != nullptr || body.q_count == 0;
+}
+DeformedBody deformed(const TreeView& tree, const prolate_deformed_body& body) {
+    return {tree, same<Pose>(body.body.pose), {body.q, body.q_count}};
+}
+void write_reason(Undecided reason, prolate_undecided* to) {
+    if (to != nullptr) *to = static_cast<prolate_undecided>(reason);
 }
 
 prolate_contact_result result_of(const ContactResult& r) {
@@ -102,10 +127,7 @@ prolate_status prolate_collide(prolate_body a, prolate_body b, void* scratch, si
     const CollideResult r = collide(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
                                     capi::options_of(given), cache != nullptr ? &own : nullptr);
     if (cache != nullptr) std::memcpy(cache->opaque, &own, sizeof own), cache->used = 1;
-    auto out = fresh<prolate_collide_result>();
-    out.verdict = verdict_of(r.verdict), out.enclosed = r.enclosed;
-    out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
-    write(out, result);
+    write(result_of(r), result);
     return PROLATE_OK;
 }
 
@@ -177,21 +199,43 @@ float prolate_mode_range(const prolate_tree* tree, uint32_t mode) {
 
 prolate_status prolate_collide_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
                                         size_t scratch_size, const prolate_query_options* options,
-                                        prolate_deformed_result* result) {
+                                        prolate_collide_result* result, prolate_undecided* reason) {
     auto given = fresh<prolate_query_options>();
     const Call call({a.body.tree, b.body.tree}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
-    for (const prolate_deformed_body& body : {a, b})
-        if (body.q == nullptr && body.q_count > 0) return PROLATE_BAD_ARGUMENT;
-    const auto deformed = [](const TreeView& tree, const prolate_deformed_body& body) {
-        return DeformedBody{tree, same<Pose>(body.body.pose), {body.q, body.q_count}};
-    };
+    if (!has_coordinates(a) || !has_coordinates(b)) return PROLATE_BAD_ARGUMENT;
     const DeformedCollideResult r =
         collide(deformed(call.a(), a), deformed(call.b(), b), call.scratch, capi::options_of(given));
-    auto out = fresh<prolate_deformed_result>();
-    out.verdict = verdict_of(r.verdict), out.reason = static_cast<prolate_undecided>(r.reason);
-    out.enclosed = r.enclosed, out.pair = same<prolate_meeting_pair>(r.pair), out.stats = stats_of(r.stats);
-    write(out, result);
+    write(result_of(r), result);
+    write_reason(r.reason, reason);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_distance_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
+                                         size_t scratch_size, const prolate_distance_options* options,
+                                         prolate_distance_result* result, prolate_undecided* reason) {
+    auto given = fresh<prolate_distance_options>();
+    const Call call({a.body.tree, b.body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (!has_coordinates(a) || !has_coordinates(b)) return PROLATE_BAD_ARGUMENT;
+    const DeformedDistanceResult r =
+        distance(deformed(call.a(), a), deformed(call.b(), b), call.scratch, capi::options_of(given));
+    write(result_of(r), result);
+    write_reason(r.reason, reason);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_raycast_deformed(prolate_deformed_body body, prolate_ray ray, void* scratch, size_t scratch_size,
+                                        const prolate_query_options* options, prolate_raycast_result* result,
+                                        prolate_undecided* reason) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({body.body.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (!has_coordinates(body)) return PROLATE_BAD_ARGUMENT;
+    const DeformedRaycastResult r =
+        raycast(deformed(call.a(), body), same<Ray>(ray), call.scratch, capi::options_of(given));
+    write(result_of(r), result);
+    write_reason(r.reason, reason);
     return PROLATE_OK;
 }
 
@@ -229,11 +273,7 @@ prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch
     if (call.status != PROLATE_OK) return call.status;
     const RaycastResult r =
         raycast(call.a(), same<Pose>(body.pose), same<Ray>(ray), call.scratch, capi::options_of(given));
-    auto out = fresh<prolate_raycast_result>();
-    out.verdict = verdict_of(r.verdict), out.t = r.t, out.clear = r.clear;
-    out.point = same<prolate_vec3>(r.point), out.normal = same<prolate_vec3>(r.normal);
-    out.node = r.node, out.triangle = r.triangle, out.stats = stats_of(r.stats);
-    write(out, result);
+    write(result_of(r), result);
     return PROLATE_OK;
 }
 

@@ -260,29 +260,25 @@ typedef struct prolate_deformed_body {
     const float* q;
     uint32_t q_count;
 } prolate_deformed_body;
-/** Why nothing was decided. */
-typedef enum prolate_undecided {
+/** deform.hpp: Undecided, why a query of deformed bodies decided nothing. */
+typedef uint8_t prolate_undecided;
+enum {
     PROLATE_DECIDED = 0,
     PROLATE_UNDECIDED_COORDINATES = 1, /**< another number than the tree has modes, out of range, or NaN */
     PROLATE_UNDECIDED_INPUT = 2,       /**< a pose or a ray that is not finite */
     PROLATE_UNDECIDED_BUDGET = 3
-} prolate_undecided;
-typedef struct prolate_deformed_result {
-    uint32_t size, version;
-    prolate_verdict verdict;
-    prolate_undecided reason;
-    bool enclosed;
-    prolate_meeting_pair pair;
-    prolate_stats stats;
-} prolate_deformed_result;
+};
 /** Modes of the tree's deformation; 0 if it has none, or `tree` was not opened. */
 PROLATE_API uint32_t prolate_mode_count(const prolate_tree* tree);
 /** Largest absolute value of coordinate `mode`; 0 if there is no such mode. */
 PROLATE_API float prolate_mode_range(const prolate_tree* tree, uint32_t mode);
-/** deform.hpp: collide(). */
+/** deform.hpp: collide() and distance(). `reason` may be NULL. */
 PROLATE_API prolate_status prolate_collide_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
                                                     size_t scratch_size, const prolate_query_options* options,
-                                                    prolate_deformed_result* result);
+                                                    prolate_collide_result* result, prolate_undecided* reason);
+PROLATE_API prolate_status prolate_distance_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
+                                                     size_t scratch_size, const prolate_distance_options* options,
+                                                     prolate_distance_result* result, prolate_undecided* reason);
 
 /** contacts.hpp: ContactPoint, Manifold, ContactManifolds. Set the last to 0 before its first use; keep it from one
  * query to the next. */
@@ -355,6 +351,10 @@ typedef struct prolate_raycast_result {
 /** raycast.hpp: raycast(). */
 PROLATE_API prolate_status prolate_raycast(prolate_body body, prolate_ray ray, void* scratch, size_t scratch_size,
                                            const prolate_query_options* options, prolate_raycast_result* result);
+/** deform.hpp: raycast(). `reason` may be NULL. */
+PROLATE_API prolate_status prolate_raycast_deformed(prolate_deformed_body body, prolate_ray ray, void* scratch,
+                                                    size_t scratch_size, const prolate_query_options* options,
+                                                    prolate_raycast_result* result, prolate_undecided* reason);
 /** raycast.hpp: raycast() of many rays: a hit for each. */
 typedef struct prolate_tree_hit {
     prolate_verdict verdict;

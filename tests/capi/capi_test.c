@@ -129,20 +129,39 @@ static void test_pairs(void) {
     CHECK(s.verdict == PROLATE_OVERLAPPING && fabs(s.time_upper - 0.5) < 1e-3);
 }
 
-static void test_deformed(void) { /* deform_test.cpp asks about trees that have modes */
-    prolate_deformed_result result = PROLATE_INIT(prolate_deformed_result);
+static void test_deformed(void) { /* fuzz_capi asks about trees that have modes */
+    prolate_collide_result c = PROLATE_INIT(prolate_collide_result);
+    prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
+    prolate_raycast_result r = PROLATE_INIT(prolate_raycast_result);
+    prolate_undecided reason = PROLATE_UNDECIDED_INPUT;
+    const prolate_ray ray = {{-5, 0, 0}, {1, 0, 0}, 10};
     prolate_deformed_body still = {at(&box, 0, 0, 0), NULL, 0}, near_by = {at(&box, 0.5f, 0, 0), NULL, 0},
                           far_off = {at(&box, 3, 0, 0), NULL, 0};
-    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &result));
-    CHECK(result.verdict == PROLATE_SEPARATED && result.reason == PROLATE_DECIDED);
-    CHECK_OK(prolate_collide_deformed(still, near_by, scratch, scratch_size, NULL, &result));
-    CHECK(result.verdict == PROLATE_OVERLAPPING && !result.enclosed);
+    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason));
+    CHECK(c.verdict == PROLATE_SEPARATED && reason == PROLATE_DECIDED);
+    CHECK_OK(prolate_collide_deformed(still, near_by, scratch, scratch_size, NULL, &c, NULL));
+    CHECK(c.verdict == PROLATE_OVERLAPPING && !c.enclosed);
+    CHECK_OK(prolate_distance_deformed(still, far_off, scratch, scratch_size, NULL, &d, &reason));
+    CHECK(d.verdict == PROLATE_SEPARATED && reason == PROLATE_DECIDED && d.lower > 0 && d.lower <= d.upper);
+    prolate_distance_result rigid = PROLATE_INIT(prolate_distance_result);
+    CHECK_OK(prolate_distance(still.body, far_off.body, scratch, scratch_size, NULL, &rigid));
+    CHECK(fabs(d.upper - rigid.upper) <= 1e-5 * rigid.upper);
+    CHECK_OK(prolate_raycast_deformed(far_off, ray, scratch, scratch_size, NULL, &r, &reason));
+    CHECK(r.verdict == PROLATE_OVERLAPPING && reason == PROLATE_DECIDED && r.t > 6 && r.t < 8);
     const float q[1] = {0};
     still.q = q, still.q_count = 1; /* the tree has no modes */
-    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &result));
-    CHECK(result.verdict == PROLATE_UNDECIDED && result.reason == PROLATE_UNDECIDED_COORDINATES);
+    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason));
+    CHECK(c.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES);
+    CHECK_OK(prolate_distance_deformed(far_off, still, scratch, scratch_size, NULL, &d, &reason));
+    CHECK(d.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES && d.lower == 0 && isinf(d.upper));
+    CHECK_OK(prolate_raycast_deformed(still, ray, scratch, scratch_size, NULL, &r, &reason));
+    CHECK(r.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES && r.clear == 0);
     still.q = NULL;
-    CHECK_STATUS(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &result), PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason),
+                 PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_distance_deformed(far_off, still, scratch, scratch_size, NULL, &d, &reason),
+                 PROLATE_BAD_ARGUMENT);
+    CHECK_STATUS(prolate_raycast_deformed(still, ray, scratch, scratch_size, NULL, &r, &reason), PROLATE_BAD_ARGUMENT);
     CHECK(prolate_mode_count(&box) == 0 && prolate_mode_range(&box, 0) == 0 && prolate_mode_count(NULL) == 0);
 }
 

@@ -121,6 +121,41 @@ void query(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scr
     require(s.time_lower <= s.time_upper || s.verdict == PROLATE_SEPARATED);
 }
 
+// Coordinates within the ranges of a tree's modes, and not.
+void query_deformed(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scratch) {
+    void* const memory = scratch.bytes;
+    const size_t room = sizeof scratch.bytes;
+    float q[64];
+    const uint32_t modes = prolate_mode_count(b.tree);
+    require(modes <= 64);
+    bool in_range = true;
+    for (uint32_t m = 0; m < modes; ++m) {
+        q[m] = prolate_mode_range(b.tree, m) * in.number();
+        in_range = in_range && std::fabs(q[m]) <= prolate_mode_range(b.tree, m);
+    }
+    const prolate_deformed_body still{a, nullptr, 0}, moved{b, q, modes};
+    const bool finite = is_finite(a.pose) && is_finite(b.pose);
+    auto options = fresh<prolate_query_options>();
+    options.max_tests = in.take<uint16_t>(), options.max_level = in.take<uint8_t>() % 4, options.margin = in.number();
+    auto limits = fresh<prolate_distance_options>();
+    limits.max_tests = options.max_tests, limits.max_distance = in.number(), limits.tolerance_relative = in.number();
+    prolate_undecided reason;
+    auto c = fresh<prolate_collide_result>();
+    require(prolate_collide_deformed(still, moved, memory, room, &options, &c, &reason) == PROLATE_OK);
+    require(in_range == (reason != PROLATE_UNDECIDED_COORDINATES));
+    require((in_range && finite) || c.verdict != PROLATE_SEPARATED);
+    require((reason == PROLATE_DECIDED) == (c.verdict != PROLATE_UNDECIDED));
+    auto d = fresh<prolate_distance_result>();
+    require(prolate_distance_deformed(moved, still, memory, room, &limits, &d, &reason) == PROLATE_OK);
+    require(d.lower <= d.upper);
+    require((in_range && finite) || (d.verdict == PROLATE_UNDECIDED && d.lower == 0 && std::isinf(d.upper)));
+    require((reason == PROLATE_DECIDED) == (d.verdict != PROLATE_UNDECIDED));
+    const prolate_ray ray{in.vector(), in.vector(), in.number()};
+    auto r = fresh<prolate_raycast_result>();
+    require(prolate_raycast_deformed(moved, ray, memory, room, &options, &r, &reason) == PROLATE_OK);
+    require(in_range || (r.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES));
+}
+
 void query_more(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scratch) {
     void* const memory = scratch.bytes;
     const size_t room = sizeof scratch.bytes;
@@ -200,6 +235,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const bool sound = prolate_tree_open(rest.data(), rest.size(), &opened, nullptr) == PROLATE_OK;
     if (sound) require(prolate_tree_describe(&opened, &info) == PROLATE_OK);
     query(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
+    query_deformed(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
     query_more(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
     const prolate_vec3 half = in.vector();
     prolate_tree other;
