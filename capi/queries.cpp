@@ -410,3 +410,10 @@ prolate_status prolate_bounds(prolate_body body, float margin, prolate_box3* box
     *box = same<prolate_box3>(bounds(*view, same<Pose>(body.pose), margin));
     return PROLATE_OK;
 }
+
+prolate_status prolate_bounds_deformed(prolate_deformed_body body, float margin, prolate_box3* box) {
+    const TreeView* const view = view_of(body.body.tree);
+    if (view == nullptr || box == nullptr || !has_coordinates(body)) return PROLATE_BAD_ARGUMENT;
+    *box = same<prolate_box3>(bounds(deformed(*view, body), margin));
+    return PROLATE_OK;
+}

@@ -23,6 +23,7 @@
 // TreeView::scaled() scales the displacements, too; TreeView::rounded() rounds the deformed body.
 #pragma once
 
+#include <prolate/bounds.hpp>
 #include <prolate/collide.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/raycast.hpp>
@@ -84,5 +85,10 @@ struct DeformedRaycastResult : RaycastResult {
 /// of a rigid body. Thread-safe on shared trees.
 DeformedRaycastResult raycast(const DeformedBody& body, const Ray& ray, Scratch context,
                               const QueryOptions& options = {}) noexcept;
+
+/// A box in the world that holds the deformed mesh and all points within `margin`, metres, of it, for a broadphase:
+/// that of the root where it has moved, so less tight than bounds() of a rigid body. Infinite if the coordinates are
+/// those of Undecided::coordinates, or the pose is not finite. Thread-safe on shared trees.
+Bounds bounds(const DeformedBody& body, float margin = 0) noexcept;
 
 } // namespace prolate

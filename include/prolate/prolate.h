@@ -421,8 +421,9 @@ PROLATE_API prolate_status prolate_signed_distances(prolate_body body, const pro
 PROLATE_API prolate_status prolate_contains(prolate_body body, const prolate_vec3* points, size_t count, void* scratch,
                                             size_t scratch_size, prolate_verdict* sides);
 
-/** bounds.hpp: bounds(). */
+/** bounds.hpp: bounds(), and deform.hpp: bounds() of a deformed body. */
 PROLATE_API prolate_status prolate_bounds(prolate_body body, float margin, prolate_box3* box);
+PROLATE_API prolate_status prolate_bounds_deformed(prolate_deformed_body body, float margin, prolate_box3* box);
 
 /** types.hpp: Ellipsoid. */
 typedef struct prolate_ellipsoid {

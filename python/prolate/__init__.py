@@ -2,8 +2,9 @@
 
 :func:`bake` makes a tree of a mesh, each level of which is proved to cover it. :func:`collide`, :func:`distance`,
 :func:`contacts`, :func:`sweep`, :func:`raycast` and :func:`overlap` ask about trees at many poses at once,
-:func:`collide_solids` and :func:`distance_solids` about the solids that covers stand for, :func:`collide_deformed`
-about bodies that deform, :class:`World` about many bodies, and :mod:`prolate.pairs` about single ellipsoids.
+:func:`collide_solids` and :func:`distance_solids` about the solids that covers stand for, :func:`collide_deformed`,
+:func:`distance_deformed` and :func:`raycast_deformed` about bodies that deform, :class:`World` about many bodies, and
+:mod:`prolate.pairs` about single ellipsoids.
 docs/python.md is the tour.
 """
 
@@ -23,9 +24,11 @@ from ._queries import (
     contacts,
     contains,
     distance,
+    distance_deformed,
     distance_solids,
     overlap,
     raycast,
+    raycast_deformed,
     signed_distance,
     sweep,
 )
@@ -96,6 +99,7 @@ __all__ = [
     "convex_tree",
     "cylinder_tree",
     "distance",
+    "distance_deformed",
     "distance_solids",
     "ellipsoid_tree",
     "least_clearance",
@@ -104,6 +108,7 @@ __all__ = [
     "overlap",
     "pairs",
     "raycast",
+    "raycast_deformed",
     "signed_distance",
     "sphere_tree",
     "sweep",

@@ -189,6 +189,33 @@ def collide_deformed(
     threads: object,
     order: object,
 ) -> int | _Bytes: ...
+def distance_deformed(
+    a: object,
+    poses_a: object,
+    q_a: object,
+    b: object,
+    poses_b: object,
+    q_b: object,
+    tolerance: object,
+    max_distance: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    order: object,
+) -> tuple[_PairArrays, bool]: ...
+def raycast_deformed(
+    tree: object,
+    pose: object,
+    q: object,
+    origins: object,
+    directions: object,
+    radius: object,
+    max_t: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    order: object,
+) -> tuple[_HitArrays, bool]: ...
 def add_modes(
     tree: object, vertices: object, faces: object, placement: object, modes: object, ranges: object
 ) -> _Bytes: ...

@@ -202,6 +202,89 @@ def collide_deformed(
     return _VERDICTS[found] if isinstance(found, int) else found
 
 
+def distance_deformed(
+    a: Tree,
+    poses_a: ArrayLike,
+    b: Tree,
+    poses_b: ArrayLike,
+    *,
+    q_a: ArrayLike | None = None,
+    q_b: ArrayLike | None = None,
+    tolerance: float = 1e-6,
+    max_distance: float | None = None,
+    max_level: int | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> Distances:
+    """How far apart are two bodies that deform by modes, at each of N poses and coordinates?
+
+    ``lower`` is certain of the deformed meshes. ``upper`` is that of the deformed triangles of exact trees, and of the
+    leaf ellipsoids of others, as their coordinates move and enlarge them.
+
+    Parameters
+    ----------
+    a, poses_a, b, poses_b, q_a, q_b
+        As for :func:`collide_deformed`.
+    tolerance, max_distance, max_level, budget, threads, order
+        As for :func:`distance`.
+
+    Returns
+    -------
+    Distances
+        Where a coordinate is NaN or beyond :attr:`Tree.mode_ranges`: ``UNDECIDED``, ``lower`` 0, ``upper`` infinite.
+        Where one body may lie inside the other, ``lower`` is 0 and ``upper`` that of the surfaces.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`collide_deformed`.
+    """
+    arrays, single = _core.distance_deformed(
+        a, poses_a, q_a, b, poses_b, q_b, tolerance, max_distance, max_level, budget, threads, order
+    )
+    return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
+
+
+def raycast_deformed(
+    tree: Tree,
+    pose: ArrayLike,
+    origins: ArrayLike,
+    directions: ArrayLike,
+    radius: float = 0,
+    *,
+    q: ArrayLike | None = None,
+    max_t: float | None = None,
+    max_level: int | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> Hits:
+    """Where do N rays, or balls that fly along them, first meet a body that deforms by modes?
+
+    Parameters
+    ----------
+    tree, pose, origins, directions, radius, max_t, max_level, budget, threads, order
+        As for :func:`raycast`. A tree of :meth:`Tree.with_modes`, or a rigid one.
+    q : array of shape (M,) or (N, M), optional
+        As for :func:`collide_deformed`.
+
+    Returns
+    -------
+    Hits
+        Nothing is hit, and the verdict is ``UNDECIDED``, where a coordinate is NaN or beyond :attr:`Tree.mode_ranges`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`raycast`; for coordinates of another number than the tree has modes.
+    """
+    arrays, single = _core.raycast_deformed(
+        tree, pose, q, origins, directions, radius, max_t, max_level, budget, threads, order
+    )
+    return Hits(*(x[0] for x in arrays)) if single else Hits(*arrays)
+
+
 def distance_solids(
     a: Tree,
     poses_a: ArrayLike,

@@ -184,7 +184,7 @@ class Tree(_core.Tree):
         return Proof(**report)
 
     def with_modes(self, mesh: Any, faces: Any = None, *, modes: ArrayLike, ranges: ArrayLike) -> Tree:
-        """The same tree with bounds of how its nodes move by modes, proved; :func:`collide_deformed` asks about it.
+        """The same tree with bounds of how its nodes move by modes, proved. :func:`collide_deformed` asks about it.
 
         At coordinates ``q`` vertex ``v`` is at ``vertices[v] + sum(q[m] * modes[m, v])``, and the nodes hold the mesh
         for all ``q`` with ``abs(q) <= ranges``. Other queries answer for the mesh at rest.

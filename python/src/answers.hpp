@@ -34,6 +34,17 @@ struct Limits {
     }
 };
 
+/// tolerance, max_distance, max_level and budget of a call.
+inline DistanceOptions distance_options(nb::handle tolerance, nb::handle max_distance, nb::handle max_level,
+                                        nb::handle budget) {
+    DistanceOptions out;
+    out.tolerance_relative = number_from_0(tolerance, "tolerance");
+    if (!max_distance.is_none()) out.max_distance = number_from_0(max_distance, "max_distance");
+    out.max_level = static_cast<uint32_t>(whole_or(max_level, "max_level", 0, UINT32_MAX, kMaxLevels));
+    out.max_pair_tests = whole_or(budget, "budget", 0, UINT64_MAX, UINT64_MAX);
+    return out;
+}
+
 inline void store_point(double* at, const Point& p) noexcept {
     std::copy(p.begin(), p.end(), at);
 }

@@ -43,7 +43,7 @@ bool Bodies::far_apart(size_t i, double margin) const noexcept {
     return x * x + y * y + z * z > near * near;
 }
 
-PlacedBodies Bodies::placed(size_t i) const noexcept {
+PlacedBodies Bodies::placed(size_t i, double reach_a, double reach_b) const noexcept {
     PlacedBodies out;
     if (as_given_) {
         out.a = at_a_.floats()[at_a_.index(i)];
@@ -58,7 +58,7 @@ PlacedBodies Bodies::placed(size_t i) const noexcept {
     }
     const bool in_a = frame_is_a(a_, b_);
     const Frame frame = frame_ ? *frame_ : Frame(in_a ? pose_a : pose_b);
-    const RoundedPose other = in_frame(frame, in_a ? pose_b : pose_a, (in_a ? b_ : a_).reach);
+    const RoundedPose other = in_frame(frame, in_a ? pose_b : pose_a, in_a ? reach_b : reach_a);
     out.in_frame = true;
     out.frame = frame.pose;
     (in_a ? out.b : out.a) = other.pose;

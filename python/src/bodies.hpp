@@ -18,7 +18,9 @@ public:
     bool single() const noexcept { return at_a_.single() && at_b_.single(); }
 
     /// Where the bodies of query `i` are.
-    PlacedBodies placed(size_t i) const noexcept;
+    PlacedBodies placed(size_t i) const noexcept { return placed(i, a_.reach, b_.reach); }
+    /// Of bodies that deform: how far they reach from their origins then.
+    PlacedBodies placed(size_t i, double reach_a, double reach_b) const noexcept;
     /// Are they farther apart than `margin`? Said only if balls around them tell, in double precision, and never of
     /// poses that came as floats, which the runtime takes as they are.
     bool far_apart(size_t i, double margin) const noexcept;

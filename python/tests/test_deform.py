@@ -68,10 +68,61 @@ def test_covers_miss_nothing_that_triangles_meet(trees: list[prolate.Tree]) -> N
     assert (found[truth == Verdict.OVERLAPPING] == Verdict.OVERLAPPING).all()
 
 
+def test_distances_and_rays_are_those_of_what_has_moved(trees: list[prolate.Tree]) -> None:
+    cover, exact = trees
+    # Stretched along x, it reaches half as far again.
+    reach = float(VERTICES[:, 0].max())
+    poses = np.array([[4, 0, 0, 0, 0, 0, 1], [2.2, 0, 0, 0, 0, 0, 1]])
+    q = np.array([[0.5, 0], [0.5, 0]])
+    found = prolate.distance_deformed(exact, REST, exact, poses, q_a=q)
+    assert found.verdict.tolist() == [Verdict.SEPARATED, Verdict.OVERLAPPING]
+    assert found.lower[0] <= 4 - 2.5 * reach <= found.upper[0] + 1e-5
+    assert found.upper[0] - found.lower[0] < 1e-5
+    assert found.lower[1] == 0
+    assert found.point_a[0] == pytest.approx([1.5 * reach, 0, 0], abs=0.5)
+    of_covers = prolate.distance_deformed(cover, REST, cover, poses, q_a=q)
+    assert (of_covers.lower <= found.upper).all()
+    assert of_covers.lower[0] > 0.5
+    single = prolate.distance_deformed(exact, REST, exact, poses[0])
+    assert single.upper == pytest.approx(4 - 2 * reach, abs=1e-5)
+
+    rays = prolate.raycast_deformed(exact, REST, [5, 0, 0], [-1, 0, 0], q=[[0.5, 0], [0, 0], [-0.5, 0]])
+    assert rays.t == pytest.approx(5 - reach * np.array([1.5, 1, 0.5]), abs=1e-5)
+    assert rays.normal[0] == pytest.approx([1, 0, 0], abs=0.4)
+    assert prolate.raycast_deformed(exact, REST, [5, 0, 0], [-1, 0, 0], q=[0.5, 0]).t == pytest.approx(
+        rays.t[0], abs=1e-9
+    )
+    assert (prolate.raycast_deformed(cover, REST, [5, 0, 0], [-1, 0, 0], q=q).t <= rays.t[0] + 1e-5).all()
+    assert prolate.raycast_deformed(cover, REST, [5, 0, 0], [1, 0, 0], q=[0.5, 0]).verdict == Verdict.SEPARATED
+
+
+def test_bounds_hold_of_poses_as_they_are_given(trees: list[prolate.Tree]) -> None:
+    """Far from the origin, with coordinates that make the body larger."""
+    random = np.random.default_rng(2)
+    n = 200
+    q = random.choice([-1.0, 1.0], (n, 2)) * RANGES
+    turn = random.normal(size=(n, 4))
+    shift = random.uniform(-2, 2, (n, 3))
+    here = np.concatenate([np.zeros((n, 3)), turn], axis=1)
+    there = np.concatenate([shift, np.roll(turn, 1, axis=0)], axis=1)
+    near = prolate.distance_deformed(trees[1], here, trees[1], there, q_a=q)
+    for poses in (here, there):
+        poses[:, :3] += [4e6, -3e6, 1e6]
+    far = prolate.distance_deformed(trees[1], here, trees[1], there, q_a=q)
+    assert (far.lower <= near.upper + 1e-9).all()
+    assert (far.upper >= near.lower - 1e-9).all()
+    assert (far.verdict == Verdict.SEPARATED).any()
+
+
 def test_out_of_range_is_undecided(trees: list[prolate.Tree]) -> None:
     far = [100, 0, 0, 0, 0, 0, 1]
     for bad in (0.51, -0.51, np.nan, np.inf):
         assert prolate.collide_deformed(trees[0], REST, trees[0], far, q_a=[bad, 0]) is Verdict.UNDECIDED
+        found = prolate.distance_deformed(trees[0], REST, trees[0], far, q_b=[bad, 0])
+        assert (found.verdict, found.lower, found.upper) == (Verdict.UNDECIDED, 0, np.inf)
+        assert np.isnan(found.point_a).all()
+        hit = prolate.raycast_deformed(trees[0], REST, far[:3], [-1, 0, 0], q=[bad, 0])
+        assert (hit.verdict, hit.t) == (Verdict.UNDECIDED, np.inf)
 
 
 def test_refuses_what_cannot_be(trees: list[prolate.Tree]) -> None:
@@ -94,6 +145,12 @@ def test_refuses_what_cannot_be(trees: list[prolate.Tree]) -> None:
         prolate.collide_deformed(rigid, REST, rigid, REST, q_a=[1])
     with pytest.raises(ValueError, match="q_a"):
         prolate.collide_deformed(trees[0], REST, trees[0], REST, q_a=[1, 2, 3])
+    with pytest.raises(ValueError, match="poses_a: has 2 poses, not 1 or 3"):
+        prolate.distance_deformed(trees[0], [REST, REST], trees[0], REST, q_b=np.zeros((3, 2)))
+    with pytest.raises(ValueError, match="q: the tree has no modes"):
+        prolate.raycast_deformed(rigid, REST, [5, 0, 0], [-1, 0, 0], q=[1])
+    with pytest.raises(ValueError, match="coordinates, origins"):
+        prolate.raycast_deformed(trees[0], REST, [[5, 0, 0]] * 3, [-1, 0, 0], q=np.zeros((2, 2)))
 
 
 def test_takes_scaled_meshes() -> None:

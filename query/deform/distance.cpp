@@ -30,20 +30,20 @@ namespace {
 using glm::dvec3;
 using query::Bound, query::Deformed, query::DeformedPair, query::PlacedTriangle, query::TriangleDistance;
 
-constexpr double kFarAway = std::numeric_limits<double>::infinity();
+constexpr double kNoLeaves = std::numeric_limits<double>::infinity();
 constexpr double kJustApart = std::numeric_limits<double>::min(); // a bound of what is certainly apart
 // Bounds of inner pairs are this share of their sizes below the gap at most; of leaves, of the tolerance.
-constexpr double kOfSizes = 1.0 / 64, kOfTolerance = 0.25;
-constexpr double kLeastTolerance = 1e-12, kMostTolerance = 1;
+constexpr double kOfSizes = 1.0 / 64, kOfDeformedTolerance = 0.25;
+constexpr double kLeastDeformedTolerance = 1e-12, kMostDeformedTolerance = 1;
 
 // Lengths of cores less `radii`, rounded down or up.
-double less(double length, double radii) {
+double less_radii(double length, double radii) {
     return length - radii - (std::abs(length) + radii) * 0x1p-51;
 }
-double less_rounded_up(double length, double radii) {
+double less_radii_up(double length, double radii) {
     return std::max(0.0, length - radii + (std::abs(length) + radii) * 0x1p-51);
 }
-float rounded_down(double bound) {
+float entry_bound(double bound) {
     const auto out = static_cast<float>(bound);
     return double{out} > bound ? std::nextafter(out, 0.0f) : out;
 }
@@ -56,8 +56,8 @@ public:
         : pair_(pair), radius_a_(pair.a.tree().radius()), radius_b_(pair.b.tree().radius()), options_(options),
           scratch_(scratch), room_(query::heap_room(scratch, pair.a.tree(), pair.b.tree())), heap_(scratch.entries()) {
         options_.tolerance_absolute = query::sound_tolerance(options.tolerance_absolute);
-        options_.tolerance_relative =
-            std::clamp(query::sound_tolerance(options.tolerance_relative), kLeastTolerance, kMostTolerance);
+        options_.tolerance_relative = std::clamp(query::sound_tolerance(options.tolerance_relative),
+                                                 kLeastDeformedTolerance, kMostDeformedTolerance);
         options_.max_distance = query::sound_length(options.max_distance);
     }
 
@@ -67,7 +67,7 @@ public:
         const double bound = gap(pair_.bound_a(0), pair_.bound_b(0));
         if (!(bound > 0)) inside = query::look_inside_both(pair_, scratch_.entries(), options_.max_pair_tests, stats);
         if (inside == query::Enclosure::out_of_tests) return stop(0);
-        if (!skips(bound)) search({0, 0, rounded_down(bound), bound > 0});
+        if (!skips(bound)) search({0, 0, entry_bound(bound), bound > 0});
     }
 
     double lower() const {
@@ -78,7 +78,7 @@ public:
     QueryStats stats = {};
     query::Enclosure inside = query::Enclosure::none;
     bool overlapping = false; // the nearest leaves, or triangles, meet
-    double upper = kFarAway;  // of the nearest leaves found,
+    double upper = kNoLeaves; // of the nearest leaves found,
     MeetingPair nearest = {}; // these, and points of them
     dvec3 on_a{0, 0, 0}, on_b{0, 0, 0};
 
@@ -89,7 +89,7 @@ private:
     }
     // Pairs whose bound is at least this, > 0, need not be looked at.
     double enough() const {
-        const double improving = upper < kFarAway ? upper - tolerance(upper) : kFarAway;
+        const double improving = upper < kNoLeaves ? upper - tolerance(upper) : kNoLeaves;
         return std::max(std::min(options_.max_distance, improving), kJustApart);
     }
     bool skips(double bound) {
@@ -108,10 +108,10 @@ private:
         const double radii = x.radius + y.radius + radius_a_ + radius_b_;
         const double slack = query::kSeparationMargin * (x.core.reach + y.core.reach);
         const double spheres =
-            less(glm::length(y.core.center - x.core.center) - x.core.size - y.core.size - slack, radii);
+            less_radii(glm::length(y.core.center - x.core.center) - x.core.size - y.core.size - slack, radii);
         if (spheres >= enough()) return spheres;
         const double wanted = kOfSizes * (x.core.size + y.core.size);
-        const double out = less(query::distance_of(x.core, y.core, wanted).lower, radii);
+        const double out = less_radii(query::distance_of(x.core, y.core, wanted).lower, radii);
         if (out > 0) return out;
         return query::apart(x, y, margin()) ? kJustApart : 0;
     }
@@ -131,7 +131,7 @@ private:
                 if (heap_.size() + count_ <= room_)
                     for (uint32_t i = 0; i < count_; ++i) heap_.push(children_[i]);
                 else if (!depth_first())
-                    return stop(go_on ? double{next.bound} : kFarAway);
+                    return stop(go_on ? double{next.bound} : kNoLeaves);
                 if (go_on && !overlapping) {
                     e = next;
                     continue;
@@ -177,12 +177,12 @@ private:
         if (children.count > left()) return false;
         stats.pair_tests += children.count;
         stats.deepest_level = std::max(stats.deepest_level, side.tree().level_of(children.first));
-        double least = kFarAway;
+        double least = kNoLeaves;
         for (uint32_t c = children.first; c < children.first + children.count; ++c) {
             const double own = open_a ? gap(pair_.bound_a(c), of_b) : gap(of_a, pair_.bound_b(c));
             const double bound = std::max(own, double{e.bound});
             if (skips(bound)) continue;
-            children_[count_++] = {open_a ? c : e.node_a, open_a ? e.node_b : c, rounded_down(bound),
+            children_[count_++] = {open_a ? c : e.node_a, open_a ? e.node_b : c, entry_bound(bound),
                                    e.flags | uint32_t{own > 0}};
             if (bound < least)
                 least = bound;
@@ -206,12 +206,12 @@ private:
 
     void decide_ellipsoids(const Entry& e) {
         const Bound x = pair_.bound_a(e.node_a), y = pair_.bound_b(e.node_b);
-        const double wanted = upper < kFarAway ? kOfTolerance * tolerance(upper) : 0;
+        const double wanted = upper < kNoLeaves ? kOfDeformedTolerance * tolerance(upper) : 0;
         query::Gap found = query::distance_of(x.core, y.core, wanted);
         // If these are the nearest, what is wanted is a share of their own distance.
         const double radii = x.radius + y.radius + radius_a_ + radius_b_;
-        const double least = kOfTolerance * tolerance(std::max(0.0, less(found.lower, radii)));
-        if (less(found.upper, radii) < upper && least < wanted)
+        const double least = kOfDeformedTolerance * tolerance(std::max(0.0, less_radii(found.lower, radii)));
+        if (less_radii(found.upper, radii) < upper && least < wanted)
             found = query::distance_of(x.core, y.core, least, found.normal);
         take({found.lower, found.upper, found.point_a, found.point_b}, {e.node_a, e.node_b}, e, x.radius, y.radius,
              [&] { return query::apart(x, y, margin()); });
@@ -224,7 +224,7 @@ private:
             for (uint32_t i = 0; i < of_a.count; ++i) {
                 ++stats.triangle_tests;
                 // Most are far enough from each other along the direction of the nearest ones.
-                const double along = less(query::gap_along(in_a[i], in_b, normal_), radius_a_ + radius_b_);
+                const double along = less_radii(query::gap_along(in_a[i], in_b, normal_), radius_a_ + radius_b_);
                 if (skips(std::max(along, double{e.bound}))) continue;
                 take(query::distance(in_a[i], in_b), {e.node_a, e.node_b, of_a.first + i, t}, e, 0, 0,
                      [&] { return query::separated(in_a[i], in_b, margin()); });
@@ -253,10 +253,10 @@ private:
     void take(const TriangleDistance& found, const MeetingPair& pair, const Entry& e, double beyond_a, double beyond_b,
               Apart&& are_apart) {
         const double reach_a = radius_a_ + beyond_a, reach_b = radius_b_ + beyond_b, bound = double{e.bound};
-        const double nearer = less(found.lower, reach_a + reach_b);
+        const double nearer = less_radii(found.lower, reach_a + reach_b);
         const bool meet = e.flags == 0 && !(nearer > 0) && !are_apart();
         decided_ = std::min(decided_, meet ? 0 : std::max({nearer, bound, kJustApart}));
-        const double farthest = std::max(less_rounded_up(found.upper, reach_a + reach_b), bound);
+        const double farthest = std::max(less_radii_up(found.upper, reach_a + reach_b), bound);
         if (!(farthest < upper) && !meet) return;
         upper = std::min(upper, farthest), nearest = pair, overlapping = meet;
         const dvec3 between = found.on_b - found.on_a;
@@ -273,7 +273,7 @@ private:
     query::PairHeap<> heap_;
     // Of all pairs of leaves: those decided are not nearer than `decided_`, those ruled out than `skipped_`, and those
     // that a limit left open than `open_`.
-    double decided_ = kFarAway, skipped_ = kFarAway, open_ = kFarAway;
+    double decided_ = kNoLeaves, skipped_ = kNoLeaves, open_ = kNoLeaves;
     dvec3 normal_{0, 0, 0}; // between the cores of the nearest leaves; 0 if they meet, or there are none
     uint32_t count_ = 0;    // of children_
     Entry children_[kMaxDegree];

@@ -148,6 +148,11 @@ static void test_deformed(void) { /* fuzz_capi asks about trees that have modes 
     CHECK(fabs(d.upper - rigid.upper) <= 1e-5 * rigid.upper);
     CHECK_OK(prolate_raycast_deformed(far_off, ray, scratch, scratch_size, NULL, &r, &reason));
     CHECK(r.verdict == PROLATE_OVERLAPPING && reason == PROLATE_DECIDED && r.t > 6 && r.t < 8);
+    prolate_box3 tight, wide;
+    CHECK_OK(prolate_bounds(far_off.body, 0, &tight));
+    CHECK_OK(prolate_bounds_deformed(far_off, 0, &wide));
+    CHECK(wide.lower.x <= tight.lower.x + 1e-5f && wide.upper.x >= tight.upper.x - 1e-5f && wide.lower.x > 0);
+    CHECK_STATUS(prolate_bounds_deformed(far_off, 0, NULL), PROLATE_BAD_ARGUMENT);
     const float q[1] = {0};
     still.q = q, still.q_count = 1; /* the tree has no modes */
     CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason));
@@ -156,6 +161,8 @@ static void test_deformed(void) { /* fuzz_capi asks about trees that have modes 
     CHECK(d.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES && d.lower == 0 && isinf(d.upper));
     CHECK_OK(prolate_raycast_deformed(still, ray, scratch, scratch_size, NULL, &r, &reason));
     CHECK(r.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES && r.clear == 0);
+    CHECK_OK(prolate_bounds_deformed(still, 0, &wide));
+    CHECK(isinf(wide.upper.x));
     still.q = NULL;
     CHECK_STATUS(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason),
                  PROLATE_BAD_ARGUMENT);

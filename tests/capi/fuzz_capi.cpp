@@ -3,7 +3,8 @@
 //
 //   build-fuzz/tests/fuzz_capi -max_total_time=60 -max_len=4096 corpus tests/data
 //
-// The input: numbers for poses, shapes and options first, then the bytes of a tree; where these are no tree, a box.
+// The input: numbers for poses, shapes and options first, then the bytes of a tree; where these are no tree, the whole
+// input as one (so that files are seeds), or a box.
 #include <prolate/prolate.h>
 
 #include <algorithm>
@@ -140,6 +141,9 @@ void query_deformed(Input& in, const prolate_body& a, const prolate_body& b, Scr
     auto limits = fresh<prolate_distance_options>();
     limits.max_tests = options.max_tests, limits.max_distance = in.number(), limits.tolerance_relative = in.number();
     prolate_undecided reason;
+    prolate_box3 box;
+    require(prolate_bounds_deformed(moved, in.number(), &box) == PROLATE_OK);
+    require(in_range || std::isinf(box.upper.x));
     auto c = fresh<prolate_collide_result>();
     require(prolate_collide_deformed(still, moved, memory, room, &options, &c, &reason) == PROLATE_OK);
     require(in_range == (reason != PROLATE_UNDECIDED_COORDINATES));
@@ -232,7 +236,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     auto info = fresh<prolate_tree_info>();
     Input rest = in;
     for (int i = 0; i < 256; ++i) rest.take<uint8_t>(); // what follows the numbers
-    const bool sound = prolate_tree_open(rest.data(), rest.size(), &opened, nullptr) == PROLATE_OK;
+    const bool sound = prolate_tree_open(rest.data(), rest.size(), &opened, nullptr) == PROLATE_OK ||
+                       prolate_tree_open(data, size, &opened, nullptr) == PROLATE_OK;
     if (sound) require(prolate_tree_describe(&opened, &info) == PROLATE_OK);
     query(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);
     query_deformed(in, {&made, pose_a}, {sound ? &opened : &made, pose_b}, *scratch);

@@ -117,6 +117,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         require(collide_solids(tree, a, tree, b, context, limits).stats.tests() <= limits.max_pair_tests);
         const DeformedBody moved{tree, a, {q, modes}};
         require(collide(moved, {tree, b}, context, options).stats.tests() <= options.max_pair_tests);
+        const DeformedDistanceResult d = distance(
+            moved, {tree, b}, context, {.max_level = options.max_level, .max_pair_tests = options.max_pair_tests});
+        require(d.stats.tests() <= options.max_pair_tests && d.lower <= d.upper);
         require(raycast(moved, {b.translation, {1, 2, 3}}, context, options).stats.tests() <= options.max_pair_tests);
         const CollideResult ab = collide(tree, a, tree, b, context, options);
         const CollideResult ba = collide(tree, b, tree, a, context, options);

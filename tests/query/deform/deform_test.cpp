@@ -139,6 +139,30 @@ bool meet(const std::vector<query::PlacedTriangle>& a, const std::vector<query::
     return false;
 }
 
+TEST_F(Deform, BoxesHoldDeformedTriangles) {
+    Random random(12);
+    for (int i = 0; i < 300; ++i) {
+        const auto q = torus().random_q(random);
+        const Pose pose = near_pose(random, i % 2 ? 3 : 1e4);
+        const auto triangles = placed(torus(), q, pose);
+        for (const TreeView& tree : {torus_cover().view(), torus_exact().view()}) {
+            const Bounds box = bounds(DeformedBody{tree, pose, q}), wide = bounds(DeformedBody{tree, pose, q}, 0.5f);
+            double least = HUGE_VAL;
+            for (const query::PlacedTriangle& t : triangles)
+                for (const glm::dvec3& x : t.corner) {
+                    ASSERT_TRUE(x.x >= double{box.lower.x} && x.y >= double{box.lower.y} && x.z >= double{box.lower.z});
+                    ASSERT_TRUE(x.x <= double{box.upper.x} && x.y <= double{box.upper.y} && x.z <= double{box.upper.z});
+                    least = std::min(least, x.x - double{box.lower.x});
+                }
+            EXPECT_LT(least, 2.5); // no more than the body is large
+            EXPECT_NEAR(double{wide.lower.x}, double{box.lower.x} - 0.5, 1e-2);
+        }
+    }
+    EXPECT_EQ(bounds(DeformedBody{torus_cover().view(), {}, torus().displacements}).upper.y, HUGE_VALF);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_EQ(bounds(DeformedBody{torus_cover().view(), {{nan, 0, 0}, {}}}).lower.x, -HUGE_VALF);
+}
+
 TEST_F(Deform, CollideMissesNothingThatDeformedTrianglesMeet) {
     Random random(5);
     int counts[2] = {}, sure = 0, enclosed = 0;
