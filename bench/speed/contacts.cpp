@@ -49,9 +49,10 @@ template <class Query> void measure(benchmark::State& state, const std::vector<P
     state.counters["tests"] = static_cast<double>(tests) / static_cast<double>(step);
 }
 
-void on_ground(benchmark::State& state, const TreeView& tree, float lowest, double depth) {
+void on_ground(benchmark::State& state, const TreeView& tree, float lowest, double depth, bool anew = false) {
     measure(state, poses_near({0, 0, -lowest - static_cast<float>(depth)}, depth),
             [&](const Pose& pose, ContactManifolds& manifolds, QueryContext& context) {
+                if (anew) manifolds = {};
                 return contacts(tree, pose, {{0, 0, 1}, 0}, manifolds, context, {.margin = 0.001f});
             });
 }
@@ -87,6 +88,24 @@ void flange_on_ground(benchmark::State& state) { // 5,000 triangles
     on_ground(state, *TreeView::open(scene.bytes), 0, 1e-3);
 }
 BENCHMARK(flange_on_ground);
+void flange_lands(benchmark::State& state) { // nothing is known of an earlier step
+    const scenes::ExactScene scene = scenes::exact_tree(flange());
+    on_ground(state, *TreeView::open(scene.bytes), 0, 1e-3, true);
+}
+BENCHMARK(flange_lands);
+void ball_rolls(benchmark::State& state) { // 5,120 triangles, half a degree a step
+    const scenes::ExactScene scene = scenes::exact_tree(shapes::icosphere(4));
+    const TreeView ball = *TreeView::open(scene.bytes);
+    std::vector<Pose> poses;
+    for (size_t i = 0; i < kPoses; ++i) {
+        const float half = 0.25f * std::numbers::pi_v<float> / 180 * static_cast<float>(i);
+        poses.push_back({{0, 0, 0.998f}, {std::sin(half), 0, 0, std::cos(half)}});
+    }
+    measure(state, poses, [&](const Pose& pose, ContactManifolds& manifolds, QueryContext& context) {
+        return contacts(ball, pose, {{0, 0, 1}, 0}, manifolds, context, {.margin = 0.001f});
+    });
+}
+BENCHMARK(ball_rolls);
 void torus_on_ground(benchmark::State& state) { // 5,000 triangles
     const scenes::ExactScene scene = scenes::exact_tree(shapes::torus(1, 0.3f, 50, 50));
     on_ground(state, *TreeView::open(scene.bytes), -0.3f, 1e-3);

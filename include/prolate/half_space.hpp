@@ -22,11 +22,15 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
 
 /// Contacts of the body with the half-space: one manifold, whose normal is against that of the half-space (moving the
 /// half-space along it takes it out of the body). Its points are the corners of an exact tree, or of ellipsoids the
-/// deepest points, that lie in the half-space or within options.margin of it: the deepest (to within 1 %, or 1e-5 of
-/// the body's size), and those that span the largest area with it. Their ids name the vertex or node. Replaces the
-/// contents of `manifolds`; points that were there before keep their age and impulse. The verdict is that of overlap(),
-/// at full depth; if it is overlapping, there is a point. ContactResult::found counts the corners that were looked at
-/// and touch. Thread-safe on shared trees.
+/// deepest points, that lie in the half-space or within options.margin of it: the deepest (to within 1 %, or 1e-4 of
+/// the body's size), and those that span the largest area with it. An id is that of a vertex, or node, alone.
+///
+/// Replaces the contents of `manifolds`; points that were there before keep their age and impulse. The search begins
+/// with these points, and keeps those that touch while others reach no farther out by a sixteenth of the extent: what
+/// rests costs a fraction of what has just landed. So keep the manifolds, and reset them when the tree changes.
+///
+/// The verdict is that of overlap(), at full depth; if it is overlapping, there is a point. ContactResult::found counts
+/// the corners that were looked at and touch. Thread-safe on shared trees.
 ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& half_space, ContactManifolds& manifolds,
                        Scratch context, const QueryOptions& options = {}) noexcept;
 

@@ -25,6 +25,10 @@ public:
     template <class Holds> bool any(Holds&& holds) const {
         return std::any_of(points_, points_ + point_count_, [&](const Point& p) { return holds(p.middle); });
     }
+    /// Calls visit(id) for each point.
+    template <class Visit> void for_each_id(Visit&& visit) const {
+        for (uint32_t i = 0; i < point_count_; ++i) visit(points_[i].id);
+    }
     /// Was there a point of this id, and about this normal?
     bool knows(uint64_t id, const glm::dvec3& normal) const noexcept;
     /// Gives the points of a new manifold that are known the age and the impulse that they had.

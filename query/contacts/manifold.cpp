@@ -24,9 +24,11 @@ bool instead(const Candidate& old, const Candidate& other, double ahead, double 
 
 } // namespace
 
-Patch::Patch(const dvec3& normal) noexcept : seed_(normal) {
-    const dvec3 across = std::abs(normal.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0);
-    x_ = glm::normalize(glm::cross(normal, across));
+Patch::Patch(const dvec3& normal) noexcept
+    : Patch(normal, glm::cross(normal, std::abs(normal.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0))) {}
+
+Patch::Patch(const dvec3& normal, const dvec3& along) noexcept : seed_(normal) {
+    x_ = glm::normalize(along - glm::dot(along, normal) * normal);
     y_ = glm::cross(normal, x_);
 }
 
@@ -76,8 +78,7 @@ bool Patch::mixed() const noexcept {
     return glm::length(sum_) < kAgreeing * weight_;
 }
 
-uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) const noexcept {
-    const dvec3 n = normal();
+uint32_t Patch::reduce(const dvec3& n, double same_point, const Candidate* (&out)[kManifoldPoints]) const noexcept {
     const Candidate* all[kSieve];
     const uint32_t all_count = kept(all);
     uint32_t count = 0;
@@ -87,10 +88,10 @@ uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) con
         for (uint32_t i = 0; i < all_count; ++i) {
             const Candidate& c = *all[i];
             const double value = measure(c) * (c.known ? kPreferKnown : 1);
-            const auto same = [&](const Candidate& other) { return other.id == c.id; };
+            const auto same = [&](const Candidate* other) { return other->id == c.id; };
             if (value > least && std::none_of(out, out + count, same)) least = value, best = &c;
         }
-        if (best != nullptr) out[count++] = *best;
+        if (best != nullptr) out[count++] = best;
         return best != nullptr;
     };
     // Of what is as deep as the deepest, the outermost: with equal depths a corner, not what lies between two.
@@ -98,17 +99,17 @@ uint32_t Patch::reduce(double same_point, Candidate (&out)[kManifoldPoints]) con
     for (const uint8_t place : best_) mean += kept_[place].middle / double{kSieve};
     const double as_deep = depth() - std::min(same_point, kSameDepth * std::abs(depth()));
     const auto outermost = [&](const Candidate& c) { return c.depth >= as_deep ? glm::length(c.middle - mean) : -1; };
-    if (!take(-0.5, outermost)) out[count++] = deepest();
-    const dvec3 p = out[0].middle;
+    if (!take(-0.5, outermost)) out[count++] = &deepest();
+    const dvec3 p = out[0]->middle;
     if (!take(same_point, [&](const Candidate& c) { return glm::length(c.middle - p); })) return count;
-    const dvec3 q = out[1].middle;
+    const dvec3 q = out[1]->middle;
     const double least_area = same_point * glm::length(q - p);
     const auto area = [&](const dvec3& a, const dvec3& b, const dvec3& c) {
         return glm::dot(n, glm::cross(b - a, c - a));
     };
     if (!take(least_area, [&](const Candidate& c) { return std::abs(area(p, q, c.middle)); })) return count;
     // What lies beyond an edge of the triangle adds another one with it.
-    const dvec3 r = out[2].middle;
+    const dvec3 r = out[2]->middle;
     const double outward = area(p, q, r) < 0 ? 1 : -1;
     take(least_area, [&](const Candidate& c) {
         const dvec3& s = c.middle;
@@ -136,12 +137,12 @@ void Patches::add(const dvec3& normal, const Candidate& candidate, double weight
 
 namespace {
 
+// `normal`: in the world, from A to B.
 ContactPoint point_of(const Candidate& c, const dvec3& normal, bool exchanged, const RelativePose& to_world) {
     ContactPoint out;
-    const auto world = [&](double along) {
-        return to_float(to_world.rotation * (c.middle + along * c.depth * normal) + to_world.translation);
-    };
-    out.point_a = world(exchanged ? -0.5 : 0.5), out.point_b = world(exchanged ? 0.5 : -0.5);
+    const dvec3 middle = to_world.rotation * c.middle + to_world.translation, half = 0.5 * c.depth * normal;
+    out.point_a = to_float(exchanged ? middle - half : middle + half);
+    out.point_b = to_float(exchanged ? middle + half : middle - half);
     out.depth = static_cast<float>(c.depth);
     out.id = c.id;
     return out;
@@ -151,13 +152,14 @@ ContactPoint point_of(const Candidate& c, const dvec3& normal, bool exchanged, c
 
 Manifold manifold_of(const Patch& patch, double same_point, bool exchanged, const RelativePose& to_world) noexcept {
     Manifold out;
-    Candidate points[kManifoldPoints];
-    out.count = patch.reduce(same_point, points);
-    for (uint32_t k = 1; k < out.count; ++k) // by id
-        for (uint32_t at = k; at > 0 && points[at].id < points[at - 1].id; --at) std::swap(points[at], points[at - 1]);
     const dvec3 normal = patch.normal(), world = to_world.rotation * normal;
+    const Candidate* points[kManifoldPoints];
+    out.count = patch.reduce(normal, same_point, points);
+    for (uint32_t k = 1; k < out.count; ++k) // by id
+        for (uint32_t at = k; at > 0 && points[at]->id < points[at - 1]->id; --at)
+            std::swap(points[at], points[at - 1]);
     out.normal = to_float(exchanged ? -world : world);
-    for (uint32_t k = 0; k < out.count; ++k) out.points[k] = point_of(points[k], normal, exchanged, to_world);
+    for (uint32_t k = 0; k < out.count; ++k) out.points[k] = point_of(*points[k], world, exchanged, to_world);
     return out;
 }
 

@@ -32,6 +32,9 @@ struct Candidate {
     MeetingPair pair;
 };
 
+/// Of the depth: what the deepest point's may be too small by.
+inline constexpr double kSameDepth = 0.01;
+
 /// Between which heights something lies along a direction.
 struct Extent {
     double low, high;
@@ -43,6 +46,8 @@ public:
     static constexpr uint32_t kSieve = 9; ///< the deepest; the farthest in eight directions
 
     explicit Patch(const glm::dvec3& normal) noexcept;
+    /// `along`: what the first of directions() is to be, about; not parallel to the normal.
+    Patch(const glm::dvec3& normal, const glm::dvec3& along) noexcept;
     Patch() = default;
 
     bool takes(const glm::dvec3& normal) const noexcept;
@@ -56,10 +61,8 @@ public:
         constexpr double kDiagonal = 0.7071067811865476;
         return {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
     }
-    /// What takes a place if it is above: depth (0), or how far out along (1 ... 4) and against (5 ... 8) directions().
-    double least(uint32_t place, double same_point) const noexcept {
-        return reach_[place] + (place == 0 ? std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point) : same_point);
-    }
+    /// Between which heights the points lie along one of directions(), if there are any.
+    Extent extent(uint32_t i) const noexcept { return {-reach_[5 + i], reach_[1 + i]}; }
     /// May a point of this depth take a place, were it known of the last query? All may, as long as there are none.
     bool may_take(const glm::dvec3& middle, double depth, double same_point) const noexcept {
         const double x = glm::dot(x_, middle), y = glm::dot(y_, middle);
@@ -77,7 +80,7 @@ public:
     template <class ExtentAlong>
     double gain(double depth, double same_point, double share, ExtentAlong&& extent) const noexcept {
         const std::array<glm::dvec3, 4> ways = directions();
-        double most = depth - least(0, same_point);
+        double most = depth - reach_[0] - std::max(kSameDepth * std::abs(reach_[0]), 0.1 * same_point);
         for (uint32_t i = 0; i < 4; ++i) {
             const Extent along = extent(ways[i]);
             const double same = std::max(same_point, share * (reach_[1 + i] + reach_[5 + i]));
@@ -105,11 +108,10 @@ public:
     bool mixed() const noexcept;
     /// Counts in the mean, without a point.
     void weigh(const glm::dvec3& normal, double weight) noexcept { sum_ += weight * normal, weight_ += weight; }
-    /// The best four or fewer. Returns how many.
-    uint32_t reduce(double same_point, Candidate (&out)[kManifoldPoints]) const noexcept;
+    /// The best four or fewer, if there are any; `n`: normal(). Returns how many.
+    uint32_t reduce(const glm::dvec3& n, double same_point, const Candidate* (&out)[kManifoldPoints]) const noexcept;
 
 private:
-    static constexpr double kSameDepth = 0.01; // of the depth: what the deepest point's may be too small by
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
     double weight_ = 0;
     Candidate kept_[kSieve]; // each once, for what it is the best for is often several things

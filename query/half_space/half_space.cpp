@@ -2,9 +2,11 @@
 // lies in the half-space; corners and ellipsoids are placed in double precision, and separated() of query/shapes
 // decides.
 //
-// Of contacts, a node is passed over if nothing in it could take a place in the manifold's sieve: the sieve keeps what
-// is deepest, and outermost in eight directions (query/contacts/manifold.hpp). So a flat bottom of a thousand triangles
-// costs little more than one of ten. Of a body of few corners, all are looked at, without the tree.
+// Of contacts, a node is passed over if nothing in it lies deeper than what is known, or farther out along the longest
+// line between two known points and across it. The search begins with the points of the last query, which most often
+// are the answer: a body at rest costs a few nodes more than the verdict. If it finds others, it goes on from these for
+// what lies only a little farther out, so that what rests has the corners of its outline. Of a body of few corners, all
+// are looked at, without the tree.
 #include <prolate/half_space.hpp>
 
 #include "query/contacts/last_contacts.hpp"
@@ -20,6 +22,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <optional>
 
@@ -36,28 +39,49 @@ PlacedHalfSpace moved(PlacedHalfSpace h, double margin) {
 
 constexpr double kSamePoint = 1e-4;  // of the body: what is nearer is one point
 constexpr uint32_t kFewCorners = 64; // all of which cost less than the blocks of nodes above them
+// Shares of the extent that is known: what lies farther out by less is not looked for, at first and if something new
+// was found.
+constexpr double kFarther = 0x1p-4, kFartherOut = 0x1p-6;
+
+// Ids name a vertex or a node, and say which: so the corners of the last query are known at once.
+uint64_t name(Part::Kind kind, uint32_t index) {
+    return uint64_t{static_cast<uint32_t>(kind)} << 32 | index;
+}
 
 // All corners and ellipsoids that touch, sieved.
 class Touching {
 public:
     Touching(HeightSearch& search, double margin, const LastContacts& last)
-        : s_(search), last_(last), touched_(moved(search.shape, margin)), surely_(kSeparationMargin * touched_.reach),
+        : s_(search), last_(last), margin_(margin), touched_(moved(search.shape, margin)),
+          surely_(kSeparationMargin * touched_.reach),
           highest_(kSeparationMargin *
                    (2 * place(search.side.tree.root_bound(), search.side.tree.scale()).reach + touched_.reach)),
           same_point(kSamePoint * place(search.side.tree.root(), search.side.tree.scale()).size),
-          patch(-search.shape.normal) {
-        std::fill(std::begin(seen_), std::end(seen_), kNoTriangle);
+          patch(-search.shape.normal) {}
+
+    void find() {
+        if (take_all()) return;
         s_.user = this;
         s_.leaf = [](void* self, uint32_t slot) { return static_cast<Touching*>(self)->leaf(slot); };
         s_.wanted = [](void* self, uint32_t slot, double bound) {
             return static_cast<Touching*>(self)->wanted(slot, bound);
         };
         s_.outline = &outline_;
+        s_.limit = margin_ + 2 * highest_; // corners that are higher do not touch
+        take_known();
+        news_ = false;
+        search();
+        if (!news_ || s_.open < HUGE_VAL) return;
+        const uint64_t once = found;
+        farther_ = kFartherOut;
+        search();
+        found = once;
     }
 
 private:
     HeightSearch& s_;
     const LastContacts& last_;
+    const double margin_;
     const PlacedHalfSpace touched_; // blown up by the margin
     // A triangle touches if a corner is no higher than kSeparationMargin (reach of the triangle, and of the plane): up
     // to here all do, whatever the triangle, and above this none.
@@ -69,10 +93,9 @@ public:
     uint64_t found = 0;
     bool meets = false;
 
-    /// Corners that are higher over the plane than this and the margin do not touch.
-    double highest() const { return 2 * highest_; }
-    /// All of them, if the body is a mesh of few corners: in the order of its triangles. False, and nothing is done, if
-    /// it is not, the budget does not suffice, or rounding leaves open which corners touch.
+private:
+    // All of them, if the body is a mesh of few corners. False, and nothing is done, if it is not, the budget does not
+    // suffice, or rounding leaves open which corners touch.
     bool take_all() {
         const TreeView& tree = s_.side.tree;
         const uint32_t corners = tree.vertex_count(), triangles = tree.triangle_count();
@@ -80,22 +103,54 @@ public:
             triangles > s_.left())
             return false;
         dvec3 at[kFewCorners];
-        double over[kFewCorners];
-        for (uint32_t v = 0; v < corners; ++v) at[v] = position(tree, v), over[v] = height(at[v], touched_);
-        const auto open = [&](double height) { return height > surely_ && height <= highest_; };
-        if (std::any_of(over, over + corners, open)) return false;
+        uint64_t touch = 0, used = 0; // bits of corners; used by triangles
+        for (uint32_t v = 0; v < corners; ++v) {
+            at[v] = position(tree, v);
+            const double over = height(at[v], touched_);
+            if (over > surely_ && over <= highest_) return false;
+            touch |= uint64_t{over <= surely_} << v;
+        }
         s_.stats.triangle_tests += triangles;
-        uint64_t seen = 0;
-        for (uint32_t t = 0; t < triangles; ++t)
-            for (const uint32_t v : tree.triangle(t)) {
-                if ((seen >> v & 1) != 0) continue;
-                seen |= uint64_t{1} << v;
-                if (over[v] <= surely_) add(at[v], {Part::Kind::vertex, v, 0});
-            }
+        for (uint32_t t = 0; t < triangles && (touch & ~used) != 0; ++t)
+            for (const uint32_t v : tree.triangle(t)) used |= uint64_t{1} << v;
+        for (touch &= used; touch != 0; touch &= touch - 1) {
+            const auto v = static_cast<uint32_t>(std::countr_zero(touch));
+            add(at[v], name(Part::Kind::vertex, v));
+        }
         return true;
     }
-
-private:
+    // The corners that touched in the last query, if they still do: most are what would be found.
+    void take_known() {
+        const TreeView& tree = s_.side.tree;
+        if (s_.side.limit_from != UINT32_MAX) return; // nodes stand for corners
+        last_.for_each_id([&](uint64_t id) {
+            const auto v = static_cast<uint32_t>(id);
+            if (v >= tree.vertex_count() || id != name(Part::Kind::vertex, v)) return;
+            const dvec3 p = position(tree, v);
+            if (height(p, touched_) <= surely_) add(p, id);
+        });
+    }
+    // Looks for what lies deeper, or farther out along the longest line between two points and across it.
+    void search() {
+        turn();
+        if (!patch.empty()) know();
+        std::fill(std::begin(seen_), std::end(seen_), kNoTriangle);
+        traverse(s_);
+    }
+    void turn() {
+        const Candidate* all[Patch::kSieve];
+        const uint32_t count = patch.empty() ? 0 : patch.kept(all);
+        dvec3 longest(0);
+        for (uint32_t i = 0; i < count; ++i)
+            for (uint32_t k = 0; k < i; ++k)
+                if (const dvec3 line = all[i]->middle - all[k]->middle;
+                    glm::dot(line, line) > glm::dot(longest, longest))
+                    longest = line;
+        if (!(glm::length(longest) > same_point)) return;
+        Patch turned(-s_.shape.normal, longest);
+        for (uint32_t i = 0; i < count; ++i) turned.add(all[i]->normal, *all[i], 1, all[i]->depth, same_point);
+        patch = turned;
+    }
     bool leaf(uint32_t slot) {
         const TreeView& tree = s_.side.tree;
         const TriangleRange range = tree.triangles(slot);
@@ -103,7 +158,7 @@ private:
         s_.stats.triangle_tests += std::max(range.count, 1u);
         if (range.count == 0) {
             const PlacedEllipsoid e = place(tree.bound(slot), tree.scale());
-            if (!separated(e, touched_)) add(lowest_point(e, s_.shape.normal), {Part::Kind::node, slot, 0});
+            if (!separated(e, touched_)) add(lowest_point(e, s_.shape.normal), name(Part::Kind::node, slot));
         }
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             const Triangle corners = tree.triangle(t);
@@ -119,16 +174,15 @@ private:
                     if (over > *rounding) continue;
                 }
                 seen = v;
-                add(p, {Part::Kind::vertex, v, 0});
+                add(p, name(Part::Kind::vertex, v));
             }
         }
         return true;
     }
-    void add(const dvec3& p, const Part& part) {
+    void add(const dvec3& p, uint64_t id) {
         const double depth = -height(p, s_.shape);
         ++found, meets = true;
         if (!patch.may_take(p, depth, same_point)) return;
-        const uint64_t id = id_of(part, {Part::Kind::face, 0, 0});
         const dvec3 n = -s_.shape.normal;
         const bool takes = patch.add(n,
                                      {.middle = p - 0.5 * depth * n,
@@ -138,33 +192,42 @@ private:
                                       .normal = n,
                                       .pair = {}},
                                      1, depth, same_point);
-        if (takes) know();
+        if (takes && s_.outline != nullptr) news_ = true, know();
     }
     // Tells the traversal what the patch has.
     void know() {
         const LatticeInfo& lattice = s_.side.lattice;
         const double per_step = steps_per_metre(lattice);
         const std::array<dvec3, 4> directions = patch.directions();
-        outline_.below = static_cast<float>(patch.least(0, same_point) * per_step);
-        for (uint32_t i = 0; i < 4; ++i) {
-            const dvec3& d = directions[i];
+        below_ = patch.depth() + std::max(kSameDepth * std::abs(patch.depth()), same_point);
+        outline_.below = static_cast<float>(below_ * per_step);
+        for (uint32_t i = 0; i < 2; ++i) {
+            const dvec3& d = ways_[i] = directions[i];
+            const Extent known = patch.extent(i);
+            const double same = std::max(same_point, farther_ * (known.high - known.low));
+            beyond_[i] = known.high + same, beyond_[2 + i] = same - known.low;
             const double origin = d.x * lattice.origin[0] + d.y * lattice.origin[1] + d.z * lattice.origin[2];
             for (glm::length_t k = 0; k < 3; ++k) outline_.directions[i][k] = static_cast<float>(d[k]);
-            outline_.beyond[i] = static_cast<float>(patch.least(1 + i, same_point) * per_step - origin);
-            outline_.beyond[4 + i] = static_cast<float>(patch.least(5 + i, same_point) * per_step + origin);
+            outline_.beyond[i] = static_cast<float>(beyond_[i] * per_step - origin);
+            outline_.beyond[2 + i] = static_cast<float>(beyond_[2 + i] * per_step + origin);
         }
         ++outline_.version;
     }
     bool wanted(uint32_t slot, double bound) const {
-        if (patch.empty()) return true;
+        if (patch.empty() || -bound > below_) return true;
         const PlacedEllipsoid e = place(s_.side.tree.bound(slot), s_.side.tree.scale());
-        const auto extent = [&](const dvec3& d) {
-            const double middle = glm::dot(d, e.center), half = glm::length(d * e.factor);
-            return Extent{middle - half, middle + half};
-        };
-        return patch.gain(-bound, same_point, 0, extent) > 0;
+        for (uint32_t i = 0; i < 2; ++i) {
+            const double middle = glm::dot(ways_[i], e.center), half = glm::length(ways_[i] * e.factor);
+            if (middle + half > beyond_[i] || half - middle > beyond_[2 + i]) return true;
+        }
+        return false;
     }
 
+    double farther_ = kFarther;
+    bool news_ = false; // since the known
+    // What is of interest lies deeper, or along ways_ and against them farther out than this.
+    double below_ = 0, beyond_[4] = {};
+    dvec3 ways_[2];
     HeightOutline outline_;
     uint32_t seen_[16]; // corners that were added last: most belong to several triangles
 };
@@ -236,10 +299,7 @@ ContactResult contacts(const TreeView& tree, const Pose& pose, const HalfSpace& 
     }
     query::HeightSearch search(tree, shape, context, options);
     query::Touching touching(search, options.margin, last);
-    if (!touching.take_all()) {
-        search.limit = options.margin + touching.highest();
-        query::traverse(search);
-    }
+    touching.find();
     out.found = touching.found;
     out.stats = search.stats;
     out.stats.deepest_level = search.side.deepest_level();

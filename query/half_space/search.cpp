@@ -96,7 +96,7 @@ private:
         const Float3 low{side(kBlockBoxLow, 0), side(kBlockBoxLow, 1), side(kBlockBoxLow, 2)},
             high{side(kBlockBoxHigh, 0), side(kBlockBoxHigh, 1), side(kBlockBoxHigh, 2)};
         Float most = -bound - known.below;
-        for (size_t k = 0; k < 4; ++k) {
+        for (size_t k = 0; k < 2; ++k) {
             const float(&d)[3] = known.directions[k];
             const Float middle = dot(set(d), e.center), half = width(e, set(d));
             const Float3 from{low.x * d[0], low.y * d[1], low.z * d[2]},
@@ -104,7 +104,7 @@ private:
             const Float farthest = max(from.x, to.x) + max(from.y, to.y) + max(from.z, to.z),
                         nearest = min(from.x, to.x) + min(from.y, to.y) + min(from.z, to.z);
             most = max(most, max(min(farthest, middle + half) - known.beyond[k],
-                                 min(-nearest, half - middle) - known.beyond[4 + k]));
+                                 min(-nearest, half - middle) - known.beyond[2 + k]));
         }
         return most;
     }

@@ -17,8 +17,8 @@ namespace prolate::query {
 /// What is known of contacts: nodes are of interest that may reach farther out along the plane, or lie lower. In the
 /// tree's lattice coordinates, from the lattice's origin on.
 struct HeightOutline {
-    float directions[4][3]; ///< of length 1
-    float beyond[8];        ///< along these, and then against them
+    float directions[2][3]; ///< of length 1
+    float beyond[4];        ///< along these, and then against them
     float below;            ///< height over the plane
     uint32_t version = 0;   ///< of these numbers; 0: nothing is known
 };

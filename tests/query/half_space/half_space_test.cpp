@@ -163,6 +163,78 @@ TEST(HalfSpace, WhatLiesFlatSpansItsBottom) {
     EXPECT_LT(got.stats.triangle_tests, 3200u / 3); // of 3200 triangles
 }
 
+// Area of the convex hull of points, seen along z.
+double hull_area(std::vector<Point> points) {
+    std::sort(points.begin(), points.end());
+    std::vector<Point> hull;
+    const auto left = [](const Point& a, const Point& b, const Point& c) {
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0;
+    };
+    double area = 0;
+    for (int half = 0; half < 2; ++half, std::reverse(points.begin(), points.end())) {
+        hull.clear();
+        for (const Point& p : points) {
+            while (hull.size() > 1 && !left(hull[hull.size() - 2], hull.back(), p)) hull.pop_back();
+            hull.push_back(p);
+        }
+        for (size_t i = 1; i < hull.size(); ++i)
+            area += 0.5 * (hull[i - 1][0] * hull[i][1] - hull[i - 1][1] * hull[i][0]);
+    }
+    return area;
+}
+
+// Four points have at least half the area of what touches if the first two are the farthest apart, and the others the
+// farthest from their line. Here one of them is the deepest, which costs area. From step to step a body tilts and
+// turns, so that other corners touch than those of the last step, which the search begins with.
+TEST(HalfSpace, ManifoldsSpanWhatTouches) {
+    Mesh pad = shapes::icosphere(4), plate = shapes::sheet(2, 0.3f, 24);
+    for (Vec3& v : pad.vertices) v = {v.x, 0.15f * v.y, 0.3f * v.z};
+    for (Vec3& v : plate.vertices) v = {0.6f * v.x - 0.8f * v.y, 0.8f * v.x + 0.6f * v.y, v.z};
+    const scenes::ExactScene all[] = {scenes::exact_tree(pad), scenes::exact_tree(plate, {.closed = false}),
+                                      scenes::exact_tree(shapes::torus(1, 0.3f, 50, 50))};
+    Random random(31);
+    const auto context = std::make_unique<QueryContext>();
+    const HalfSpace ground{{0, 0, 1}, 0};
+    double least = 1, sum = 0;
+    int count = 0;
+    for (int i = 0; i < 60; ++i) {
+        const TreeView tree = *TreeView::open(all[i % 3].bytes);
+        const double turn = random.in(-3, 3), tilt = random.in(0, 0.05);
+        ContactManifolds manifolds;
+        for (int step = 0; step < 20; ++step) {
+            const double angle = turn + 0.01 * step, x = tilt * std::cos(0.3 * step), y = tilt * std::sin(0.3 * step);
+            Pose pose{{},
+                      {static_cast<float>(x), static_cast<float>(y), static_cast<float>(std::sin(angle / 2)),
+                       static_cast<float>(std::cos(angle / 2))}};
+            std::vector<Real> over = heights(tree, pose, plane_of(ground));
+            const float margin = 0.02f;
+            pose.translation.z = -static_cast<float>(*std::min_element(over.begin(), over.end())) - 0.004f;
+            contacts(tree, pose, ground, manifolds, *context, {.margin = margin});
+            ASSERT_EQ(manifolds.count, 1u);
+            over = heights(tree, pose, plane_of(ground));
+            std::vector<Point> touching, kept;
+            for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
+                const Vector p = to_world(pose, reference::vector(tree.vertex(v)));
+                if (over[v] <= margin) touching.push_back({static_cast<double>(p[0]), static_cast<double>(p[1]), 0});
+            }
+            double deepest = -1;
+            const Manifold& m = manifolds.manifolds[0];
+            for (uint32_t k = 0; k < m.count; ++k) {
+                kept.push_back({m.points[k].point_a.x, m.points[k].point_a.y, 0});
+                deepest = std::max(deepest, double{m.points[k].depth});
+            }
+            EXPECT_NEAR(deepest, 0.004, 2.5e-4); // 1e-4 of the bodies' size, which is about 2
+            const double whole = hull_area(touching);
+            if (whole < 1e-3) continue;
+            const double share = hull_area(kept) / whole;
+            least = std::min(least, share), sum += share, ++count;
+        }
+    }
+    EXPECT_GT(count, 800);
+    EXPECT_GT(least, 0.25);
+    EXPECT_GT(sum / count, 0.6);
+}
+
 // A body of few corners is not searched, one of many is: a fine ball inside a box makes no difference to its contacts.
 TEST(HalfSpace, FewCornersTouchAsManyDo) {
     const Mesh box = shapes::box(1, 2, 0.5f);
