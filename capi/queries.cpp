@@ -165,9 +165,9 @@ prolate_status prolate_collide_solids(prolate_body a, prolate_body b, void* scra
     const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
     const QueryOptions limits = capi::options_of(given);
-    const SolidsResult r = collide_solids(
-        call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
-        {.max_level = limits.max_level, .max_pair_tests = limits.max_pair_tests, .margin = limits.margin});
+    const SolidsResult r =
+        collide(Solid(call.a(), limits.max_level), same<Pose>(a.pose), Solid(call.b(), limits.max_level),
+                same<Pose>(b.pose), call.scratch, {.max_pair_tests = limits.max_pair_tests, .margin = limits.margin});
     auto out = fresh<prolate_solids_result>();
     out.verdict = verdict_of(r.verdict), out.out_of_budget = r.out_of_budget, out.stats = stats_of(r.stats);
     write(out, result);
@@ -179,10 +179,11 @@ prolate_status prolate_distance_solids(prolate_body a, prolate_body b, void* scr
     auto given = fresh<prolate_distance_options>();
     const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
     if (call.status != PROLATE_OK) return call.status;
-    const SolidsDistance r = distance_solids(call.a(), same<Pose>(a.pose), call.b(), same<Pose>(b.pose), call.scratch,
-                                             capi::options_of(given));
+    const SolidsDistance r = distance(Solid(call.a()), same<Pose>(a.pose), Solid(call.b()), same<Pose>(b.pose),
+                                      call.scratch, capi::options_of(given));
     auto out = fresh<prolate_solids_distance>();
     out.verdict = verdict_of(r.verdict), out.lower = r.lower, out.upper = r.upper, out.stats = stats_of(r.stats);
+    out.point_a = same<prolate_vec3>(r.point_a), out.point_b = same<prolate_vec3>(r.point_b);
     write(out, result);
     return PROLATE_OK;
 }
@@ -251,6 +252,26 @@ prolate_status prolate_contacts(prolate_body a, prolate_body b, prolate_manifold
                         capi::options_of(given));
     });
     write(result_of(r), result);
+    return PROLATE_OK;
+}
+
+prolate_status prolate_contacts_solids(prolate_body a, prolate_body b, prolate_manifolds* manifolds, void* scratch,
+                                       size_t scratch_size, const prolate_query_options* options,
+                                       prolate_solids_contacts* result) {
+    auto given = fresh<prolate_query_options>();
+    const Call call({a.tree, b.tree}, scratch, scratch_size, options, given, result);
+    if (call.status != PROLATE_OK) return call.status;
+    if (manifolds == nullptr) return PROLATE_BAD_ARGUMENT;
+    const QueryOptions limits = capi::options_of(given);
+    const SolidsContacts r = with_manifolds(manifolds, [&](ContactManifolds& own) {
+        return contacts(Solid(call.a(), limits.max_level), same<Pose>(a.pose), Solid(call.b(), limits.max_level),
+                        same<Pose>(b.pose), own, call.scratch,
+                        {.max_pair_tests = limits.max_pair_tests, .margin = limits.margin});
+    });
+    auto out = fresh<prolate_solids_contacts>();
+    out.verdict = verdict_of(r.verdict), out.depth_lower = r.depth_lower, out.depth_upper = r.depth_upper;
+    out.way_out = same<prolate_vec3>(r.way_out), out.found = r.found, out.stats = stats_of(r.stats);
+    write(out, result);
     return PROLATE_OK;
 }
 

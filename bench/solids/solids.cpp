@@ -4,11 +4,14 @@
 //
 // A body meets itself: both are turned at random, and B comes along a random direction until the solids first meet, at
 // t, by bisection with exact trees. Poses are then t plus a random part of +-1, 5 or 20 % of the diagonal. Printed are,
-// for covers of ellipsoids and of as many spheres: the share of poses that collide_solids() decides, apart and meeting;
-// the median time of a query; what a query costs on average if exact trees are asked where covers do not decide; the
-// mean width of the band that distance_solids() leaves, % of the diagonal; and the median time of that, beside
-// distance() of exact trees, both with a tolerance of 0.1 %. Every decision and every bound is compared with those of
-// the exact trees; the program fails if one is wrong.
+// for covers of ellipsoids and of as many spheres: the share of poses that collide() of solids decides, apart and
+// meeting; the time of a query; what a query costs if exact trees are asked where covers do not decide; the mean width
+// of the band that distance() of solids leaves, % of the diagonal; and the time of that, beside distance() of exact
+// trees, both with a tolerance of 0.1 %; and the time of contacts() of the covers alone and of the solids, and what the
+// bounds of the depth, where both are known, come to: the lower one's part of the upper one. Times are processor time
+// of the thread, means over all poses, the best of some rounds through all of them: each pose is another than the one
+// before, as in a program. Every decision and every bound is compared with those of the exact trees; the program fails
+// if one is wrong.
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
@@ -19,8 +22,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,14 +31,13 @@
 namespace prolate {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using scenes::Point;
 using scenes::Random;
 
 constexpr double kBands[] = {0.01, 0.05, 0.2}; // of the diagonal
 constexpr DistanceOptions kDistance{.tolerance_relative = 1e-3};
 constexpr int kBisections = 16;
-constexpr int kRepeats = 16; // of a query, to be timed
+constexpr int kRounds = 8; // through all poses, to be timed
 
 struct Settings {
     uint32_t ellipsoids = 64, inner = 64, poses = 2000;
@@ -52,10 +54,16 @@ Build bake(const Mesh& mesh, const BuildOptions& options) {
     return std::move(*built);
 }
 
+// Processor time of this thread, seconds.
+double thread_seconds() {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
 class Comparison {
 public:
     Comparison(const Mesh& mesh, const Settings& settings) : settings_(settings) {
-        const Clock::time_point start = Clock::now();
         BuildOptions exact;
         exact.exact = true;
         exact_ = std::make_unique<Build>(bake(mesh, exact));
@@ -67,37 +75,36 @@ public:
                                                            : Quality::normal;
             covers_.push_back(std::make_unique<Build>(bake(mesh, options)));
         }
-        fmt::print("  baked in {:.1f} s; outside ratio, share of the solid inside: ellipsoids {:.3f}, {:.3f}; spheres "
-                   "{:.3f}, {:.3f}; bytes {} and {}, exact {}\n",
-                   std::chrono::duration<double>(Clock::now() - start).count(), outside(0), inside(0), outside(1),
-                   inside(1), covers_[0]->tree.bytes().size(), covers_[1]->tree.bytes().size(),
-                   exact_->tree.bytes().size());
-        fmt::print("  {:>6} {:>10} {:>8} {:>8} {:>8} {:>8} {:>10} {:>8} {:>12}\n", "within", "covers", "decided",
-                   "apart", "meeting", "us", "us in all", "band %", "distance us");
+        fmt::print("  outside ratio, share of the solid inside: ellipsoids {:.3f}, {:.3f}; spheres {:.3f}, {:.3f}; "
+                   "bytes {} and {}, exact {}\n",
+                   outside(0), inside(0), outside(1), inside(1), covers_[0]->tree.bytes().size(),
+                   covers_[1]->tree.bytes().size(), exact_->tree.bytes().size());
+        fmt::print("  {:>6} {:>10} {:>8} {:>8} {:>8} {:>8} {:>10} {:>8} {:>12} {:>18} {:>7}\n", "within", "covers",
+                   "decided", "apart", "meeting", "us", "us in all", "band %", "distance us", "contacts us", "depth");
     }
 
     // False if an answer was wrong.
     bool run(double band) {
         const std::vector<Placed> poses = poses_within(band);
-        std::vector<Verdict> truth;
-        std::vector<double> exact_times, distance_times;
-        std::vector<DistanceResult> distances;
         const TreeView exact = exact_->tree.view();
+        std::vector<Verdict> truth;
+        std::vector<DistanceResult> distances;
         for (const Placed& p : poses) {
-            distances.push_back(distance(exact, p.a, exact, p.b, *context_, kDistance));
-            distance_times.push_back(
-                time([&] { return distance(exact, p.a, exact, p.b, *context_, kDistance).verdict; }));
             truth.push_back(collide(exact, p.a, exact, p.b, *context_).verdict);
-            exact_times.push_back(time([&] { return collide(exact, p.a, exact, p.b, *context_).verdict; }));
+            distances.push_back(distance(exact, p.a, exact, p.b, *context_, kDistance));
         }
         bool right = true;
         for (size_t k = 0; k < covers_.size(); ++k)
-            right = compare(band, k == 0 ? "ellipsoids" : "spheres", covers_[k]->tree.view(), poses, truth, distances,
-                            exact_times) &&
-                    right;
+            right =
+                compare(band, k == 0 ? "ellipsoids" : "spheres", covers_[k]->tree.view(), poses, truth, distances) &&
+                right;
+        const double collide_us =
+            time(poses, [&](const Placed& p) { return collide(exact, p.a, exact, p.b, *context_).verdict; });
+        const double distance_us = time(
+            poses, [&](const Placed& p) { return distance(exact, p.a, exact, p.b, *context_, kDistance).verdict; });
         fmt::print("  {:>5.0f}% {:>10} {:>8} {:>8.3f} {:>8.3f} {:>8.2f} {:>10.2f} {:>8} {:>12.2f}\n", 100 * band,
-                   "exact", "", share(truth, Verdict::separated), share(truth, Verdict::overlapping),
-                   median(exact_times), mean(exact_times), "", median(distance_times));
+                   "exact", "", share(truth, Verdict::separated), share(truth, Verdict::overlapping), collide_us,
+                   collide_us, "", distance_us);
         print_levels(poses);
         return right;
     }
@@ -112,27 +119,16 @@ private:
         return static_cast<double>(std::count(verdicts.begin(), verdicts.end(), of)) /
                static_cast<double>(verdicts.size());
     }
-    static double median(std::vector<double> values) {
-        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-        std::nth_element(values.begin(), middle, values.end());
-        return *middle;
-    }
-    static double mean(const std::vector<double>& values) {
-        double sum = 0;
-        for (const double v : values) sum += v;
-        return sum / static_cast<double>(values.size());
-    }
     // What each level of the ellipsoids decides, and how wide the band is there.
     void print_levels(const std::vector<Placed>& poses) {
         const TreeView tree = covers_[0]->tree.view();
         fmt::print("         levels, decided and band %:");
         for (uint32_t level = 0; level < tree.level_count(); ++level) {
+            const Solid solid(tree, level);
             double decided = 0, width = 0;
             for (const Placed& p : poses) {
-                decided +=
-                    collide_solids(tree, p.a, tree, p.b, *context_, {.max_level = level}).verdict != Verdict::undecided;
-                const SolidsDistance d =
-                    distance_solids(tree, p.a, tree, p.b, *context_, {.tolerance_relative = 1e-3, .max_level = level});
+                decided += collide(solid, p.a, solid, p.b, *context_).verdict != Verdict::undecided;
+                const SolidsDistance d = distance(solid, p.a, solid, p.b, *context_, kDistance);
                 width += d.upper - d.lower;
             }
             const auto count = static_cast<double>(poses.size());
@@ -140,15 +136,15 @@ private:
                        level + 1 < tree.level_count() ? "," : "\n");
         }
     }
-    // Microseconds of one call: the better of two rounds.
-    template <class Query> double time(const Query& query) {
+    // Microseconds of a call.
+    template <class Query> double time(const std::vector<Placed>& poses, const Query& query) {
         double best = HUGE_VAL;
-        for (int round = 0; round < 2; ++round) {
-            const Clock::time_point start = Clock::now();
-            for (int i = 0; i < kRepeats; ++i) sink_ += static_cast<uint64_t>(query());
-            best = std::min(best, std::chrono::duration<double, std::micro>(Clock::now() - start).count() / kRepeats);
+        for (int round = 0; round < kRounds; ++round) {
+            const double start = thread_seconds();
+            for (const Placed& p : poses) sink_ += static_cast<uint64_t>(query(p));
+            best = std::min(best, thread_seconds() - start);
         }
-        return best;
+        return 1e6 * best / static_cast<double>(poses.size());
     }
 
     std::vector<Placed> poses_within(double band) {
@@ -184,29 +180,42 @@ private:
     }
 
     bool compare(double band, const char* name, const TreeView& tree, const std::vector<Placed>& poses,
-                 const std::vector<Verdict>& truth, const std::vector<DistanceResult>& distances,
-                 const std::vector<double>& exact_times) {
-        std::vector<double> times, in_all, distance_times;
+                 const std::vector<Verdict>& truth, const std::vector<DistanceResult>& distances) {
+        const Solid solid(tree);
+        const TreeView exact = exact_->tree.view();
         std::vector<Verdict> verdicts;
-        double width = 0;
+        double width = 0, lower = 0, upper = 0;
         size_t wrong = 0;
         for (size_t i = 0; i < poses.size(); ++i) {
             const Placed& p = poses[i];
-            const Verdict verdict = collide_solids(tree, p.a, tree, p.b, *context_).verdict;
+            const Verdict verdict = collide(solid, p.a, solid, p.b, *context_).verdict;
             wrong += verdict != Verdict::undecided && verdict != truth[i];
             verdicts.push_back(verdict);
-            times.push_back(time([&] { return collide_solids(tree, p.a, tree, p.b, *context_).verdict; }));
-            in_all.push_back(times.back() + (verdict == Verdict::undecided ? exact_times[i] : 0));
-            const SolidsDistance d = distance_solids(tree, p.a, tree, p.b, *context_, kDistance);
+            const SolidsDistance d = distance(solid, p.a, solid, p.b, *context_, kDistance);
             wrong += d.lower > distances[i].upper || d.upper < distances[i].lower;
             width += d.upper - d.lower;
-            distance_times.push_back(
-                time([&] { return distance_solids(tree, p.a, tree, p.b, *context_, kDistance).verdict; }));
+            ContactManifolds manifolds;
+            const SolidsContacts c = contacts(solid, p.a, solid, p.b, manifolds, *context_);
+            wrong += (c.depth_lower > 0 && truth[i] != Verdict::overlapping) || c.verdict != verdict;
+            if (c.depth_lower > 0 && c.depth_upper < HUGE_VAL) lower += c.depth_lower, upper += c.depth_upper;
         }
-        fmt::print("  {:>5.0f}% {:>10} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.2f} {:>10.2f} {:>8.2f} {:>12.2f}\n", 100 * band,
-                   name, 1 - share(verdicts, Verdict::undecided), share(verdicts, Verdict::separated),
-                   share(verdicts, Verdict::overlapping), median(times), mean(in_all),
-                   100 * width / exact_->diagonal / static_cast<double>(poses.size()), median(distance_times));
+        const auto of_solids = [&](const Placed& p) { return collide(solid, p.a, solid, p.b, *context_).verdict; };
+        const auto in_all = [&](const Placed& p) {
+            const Verdict verdict = of_solids(p);
+            return verdict == Verdict::undecided ? collide(exact, p.a, exact, p.b, *context_).verdict : verdict;
+        };
+        ContactManifolds kept;
+        fmt::print(
+            "  {:>5.0f}% {:>10} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.2f} {:>10.2f} {:>8.2f} {:>12.2f} {:>8.1f}, "
+            "{:>8.1f} {:>7.2f}\n",
+            100 * band, name, 1 - share(verdicts, Verdict::undecided), share(verdicts, Verdict::separated),
+            share(verdicts, Verdict::overlapping), time(poses, of_solids), time(poses, in_all),
+            100 * width / exact_->diagonal / static_cast<double>(poses.size()),
+            time(poses,
+                 [&](const Placed& p) { return distance(solid, p.a, solid, p.b, *context_, kDistance).verdict; }),
+            time(poses, [&](const Placed& p) { return contacts(tree, p.a, tree, p.b, kept, *context_).verdict; }),
+            time(poses, [&](const Placed& p) { return contacts(solid, p.a, solid, p.b, kept, *context_).verdict; }),
+            upper > 0 ? lower / upper : 0);
         if (wrong > 0) fmt::print("  {} of {} answers are WRONG\n", wrong, poses.size());
         return wrong == 0;
     }

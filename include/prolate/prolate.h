@@ -239,17 +239,18 @@ typedef struct prolate_solids_result {
     bool out_of_budget;
     prolate_stats stats;
 } prolate_solids_result;
-/** solids.hpp: collide_solids(). */
+/** solids.hpp: collide() of solids, made for this call. */
 PROLATE_API prolate_status prolate_collide_solids(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
                                                   const prolate_query_options* options, prolate_solids_result* result);
 
 typedef struct prolate_solids_distance {
     uint32_t size, version;
     prolate_verdict verdict;
-    double lower, upper; /**< certified, of the solids; `upper` is infinite without inner covers */
+    double lower, upper;           /**< certified, of the solids; `upper` is infinite without inner covers */
+    prolate_vec3 point_a, point_b; /**< of the solids, `upper` apart; set if 0 < upper < infinity */
     prolate_stats stats;
 } prolate_solids_distance;
-/** solids.hpp: distance_solids(). */
+/** solids.hpp: distance() of solids. */
 PROLATE_API prolate_status prolate_distance_solids(prolate_body a, prolate_body b, void* scratch, size_t scratch_size,
                                                    const prolate_distance_options* options,
                                                    prolate_solids_distance* result);
@@ -309,6 +310,20 @@ typedef struct prolate_contact_result {
 PROLATE_API prolate_status prolate_contacts(prolate_body a, prolate_body b, prolate_manifolds* manifolds, void* scratch,
                                             size_t scratch_size, const prolate_query_options* options,
                                             prolate_contact_result* result);
+
+typedef struct prolate_solids_contacts {
+    uint32_t size, version;
+    prolate_verdict verdict;
+    double depth_lower, depth_upper; /**< certified, of the solids; `depth_upper` is infinite if no way out was found */
+    prolate_vec3 way_out;            /**< moving `b` by it, of length depth_upper, certainly separates the solids */
+    uint64_t found;
+    prolate_stats stats;
+} prolate_solids_contacts;
+/** solids.hpp: contacts() of solids. */
+PROLATE_API prolate_status prolate_contacts_solids(prolate_body a, prolate_body b, prolate_manifolds* manifolds,
+                                                   void* scratch, size_t scratch_size,
+                                                   const prolate_query_options* options,
+                                                   prolate_solids_contacts* result);
 
 /** sweep.hpp: Motion. */
 typedef struct prolate_motion {

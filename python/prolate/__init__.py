@@ -2,14 +2,13 @@
 
 :func:`bake` makes a tree of a mesh, each level of which is proved to cover it. :func:`collide`, :func:`distance`,
 :func:`contacts`, :func:`sweep`, :func:`raycast` and :func:`overlap` ask about trees at many poses at once,
-:func:`collide_solids` and :func:`distance_solids` about the solids that covers stand for, :func:`collide_deformed`,
-:func:`distance_deformed` and :func:`raycast_deformed` about bodies that deform, :class:`World` about many bodies, and
-:mod:`prolate.pairs` about single ellipsoids.
-docs/python.md is the tour.
+:func:`collide_solids`, :func:`distance_solids` and :func:`depth_solids` about the solids that covers stand for,
+:func:`collide_deformed`, :func:`distance_deformed` and :func:`raycast_deformed` about bodies that deform,
+:class:`World` about many bodies, and :mod:`prolate.pairs` about single ellipsoids. docs/python.md is the tour.
 """
 
 from . import pairs
-from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, SolidDistances, Sweeps, Verdict
+from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, SolidDepths, SolidDistances, Sweeps, Verdict
 from ._bake import BallRange, bake, bake_mesh, ball_range, least_clearance
 from ._bake_many import Asset, BakeResult, bake_many
 from ._errors import Error
@@ -23,6 +22,7 @@ from ._queries import (
     collide_solids,
     contacts,
     contains,
+    depth_solids,
     distance,
     distance_deformed,
     distance_solids,
@@ -70,6 +70,7 @@ __all__ = [
     "Mesh",
     "Proof",
     "SignedDistances",
+    "SolidDepths",
     "SolidDistances",
     "Sphere",
     "Sweeps",
@@ -98,6 +99,7 @@ __all__ = [
     "contains",
     "convex_tree",
     "cylinder_tree",
+    "depth_solids",
     "distance",
     "distance_deformed",
     "distance_solids",

@@ -66,6 +66,28 @@ class SolidDistances(NamedTuple):
     verdict: Verdicts
 
 
+class SolidDepths(NamedTuple):
+    """Depths of N pairs of solids, metres; scalars for single poses.
+
+    The depth is the length of the shortest translation after which the solids have no common inner point.
+
+    Attributes
+    ----------
+    lower, upper : float64 (N,)
+        Certified: ``lower <= depth of the solids <= upper``; both are 0 where they are certainly apart. ``upper`` is
+        infinite where no way out was found, ``lower`` 0 without inner covers.
+    way_out : float64 (N, 3)
+        Moving ``b`` by it, in the world, certainly separates the solids. Of length ``upper``; 0 where there is none.
+    verdict : uint8 (N,)
+        :class:`Verdict`, that of :func:`collide_solids`.
+    """
+
+    lower: Floats
+    upper: Floats
+    way_out: Floats
+    verdict: Verdicts
+
+
 class Contacts(NamedTuple):
     """Contact points of N pairs of bodies, ragged: those of pair ``i`` are rows ``offsets[i]:offsets[i + 1]``.
 

@@ -231,6 +231,16 @@ def distance_solids(
     threads: object,
     order: object,
 ) -> tuple[tuple[_Floats, _Floats, _Bytes], bool]: ...
+def depth_solids(
+    a: object,
+    poses_a: object,
+    b: object,
+    poses_b: object,
+    max_level: object,
+    budget: object,
+    threads: object,
+    order: object,
+) -> tuple[tuple[_Floats, _Floats, _Floats, _Bytes], bool]: ...
 def sweep(
     a: object,
     start_a: object,

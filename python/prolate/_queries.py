@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal
 
 from . import _core
-from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, SolidDistances, Sweeps, Verdict
+from ._answers import Bounds, Contacts, Distances, Hits, SignedDistances, SolidDepths, SolidDistances, Sweeps, Verdict
 from ._shapes import HalfSpace, Shape, ground, numbers
 
 if TYPE_CHECKING:
@@ -321,6 +321,37 @@ def distance_solids(
         a, poses_a, b, poses_b, tolerance, max_distance, max_level, budget, threads, order
     )
     return SolidDistances(*(x[0] for x in arrays)) if single else SolidDistances(*arrays)
+
+
+def depth_solids(
+    a: Tree,
+    poses_a: ArrayLike,
+    b: Tree,
+    poses_b: ArrayLike,
+    *,
+    max_level: int | None = None,
+    budget: int | None = None,
+    threads: int = 1,
+    order: Order = "xyzw",
+) -> SolidDepths:
+    """How deep are two *solids* in each other, at each of N poses? Bounds from covers outside and inside.
+
+    Parameters
+    ----------
+    a, poses_a, b, poses_b, max_level, budget, threads, order
+        As for :func:`collide_solids`.
+
+    Returns
+    -------
+    SolidDepths
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`collide`.
+    """
+    arrays, single = _core.depth_solids(a, poses_a, b, poses_b, max_level, budget, threads, order)
+    return SolidDepths(*(x[0] for x in arrays)) if single else SolidDepths(*arrays)
 
 
 def contacts(

@@ -76,6 +76,33 @@ def test_verdicts_are_those_of_the_triangles(bodies, offset, dtype):
     assert (coarse[coarse != 2] == wanted[coarse != 2]).all()
 
 
+@pytest.mark.parametrize("offset", [0, 1e5])
+def test_depths_and_ways_out(bodies, offset):
+    (a, exact_a), (b, exact_b) = bodies
+    rng = np.random.default_rng(8)
+    at_a, at_b = poses(rng, 200, 0.4), poses(rng, 200, 0.4)
+    at_a[:, :3] += offset
+    at_b[:, :3] += offset
+    depths = prolate.depth_solids(a, at_a, b, at_b, threads=2)
+    assert (depths.verdict == prolate.collide_solids(a, at_a, b, at_b)).all()
+    assert (depths.lower <= depths.upper).all()
+    assert (depths.verdict[depths.lower > 0] == Verdict.OVERLAPPING).all() and (depths.lower > 0).sum() > 50
+    out = np.isfinite(depths.upper)
+    assert out.sum() > 50
+    lengths = np.linalg.norm(depths.way_out, axis=1)
+    assert np.allclose(lengths[out], depths.upper[out], rtol=1e-6) and (lengths[~out] == 0).all()
+    moved = at_b[out].copy()
+    moved[:, :3] += depths.way_out[out]
+    assert (prolate.collide(exact_a, at_a[out], exact_b, moved) == Verdict.SEPARATED).all()
+    along = rng.normal(size=(len(at_b), 3))
+    moved = at_b.copy()
+    moved[:, :3] += along * (0.99 * depths.lower / np.linalg.norm(along, axis=1))[:, None]
+    met = depths.lower > 0
+    assert (prolate.collide(exact_a, at_a[met], exact_b, moved[met]) == Verdict.OVERLAPPING).all()
+    one = prolate.depth_solids(a, IDENTITY, b, IDENTITY)
+    assert 0 < one.lower < one.upper and one.way_out.shape == (3,)
+
+
 def test_single_poses_and_wrong_arguments(bodies):
     tree = bodies[0][0]
     assert prolate.collide_solids(tree, IDENTITY, tree, IDENTITY) is Verdict.OVERLAPPING

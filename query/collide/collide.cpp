@@ -40,15 +40,6 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, do
            query::kSeparationMargin * (2 * reach_b + before.distance + now.distance);
 }
 
-// The bodies are certainly so far apart, by spheres around their roots; NaN if the pose is not finite.
-double gap_of_spheres(const TreeView& a, const TreeView& b, const query::RelativePose& b_to_a) {
-    const query::PlacedEllipsoid root_a = query::place(a.root_bound(), a.scale()),
-                                 root_b = query::place(b.root_bound(), b.scale());
-    const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
-    return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
-           query::kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
-}
-
 // Does the pair that the cache names exist?
 bool names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b) {
     const auto good = [](const TreeView& tree, uint32_t node, uint32_t triangle) {
@@ -65,6 +56,13 @@ bool usable(const PairCache* cache, const TreeView& a, const TreeView& b, const 
 }
 
 } // namespace
+
+double query::gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
+    const PlacedEllipsoid root_a = place(a.root_bound(), a.scale()), root_b = place(b.root_bound(), b.scale());
+    const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
+    return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
+           kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
+}
 
 Verdict query::decide(CollideSearch& search) noexcept {
     if (search.all && search.options.max_pair_tests > 0 && // collide() has looked before

@@ -79,6 +79,8 @@ private:
     double triangle_reach_ = -1; // S of query/triangle/support.hpp, once it is asked for
 };
 
+/// The bodies are certainly so far apart, metres, by spheres around their roots; NaN if the pose is not finite.
+double gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept;
 /// The traversal alone: separated, overlapping (what max_level lets stand for leaves), or undecided (out of budget).
 /// Leaves that meet are counted in `found`.
 Verdict traverse(CollideSearch& search) noexcept;

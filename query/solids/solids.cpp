@@ -1,14 +1,13 @@
-// collide_solids() and distance_solids(): collide() and distance() of outer and of inner covers.
+// collide() and distance() of solids: those of outer and of inner covers.
 //
-// What is certain of the inner covers: collide() calls leaves overlapping that rounding cannot tell apart, so the pair
-// that it names is asked again. test_pair() says `overlapping` only where a common point is certain
+// What is certain of the inner covers: searches call leaves overlapping that rounding cannot tell apart, so the pair
+// that they name is asked again. test_pair() says `overlapping` only where a common point is certain
 // (query/ellipsoid/separation.hpp), and the upper bounds of distance_of(), depth_of() (query/ellipsoid/gap.hpp) and of
 // the distance of a triangle and an ellipsoid are certified. An ellipsoid that no triangle meets is within the solid by
 // more than the winding number of its center could be wrong by.
-#include <prolate/solids.hpp>
+#include "query/solids/solids.hpp"
 
 #include "query/ellipsoid/gap.hpp"
-#include "query/node/limits.hpp"
 #include "query/node/scratch.hpp"
 #include "query/triangle/ellipsoid_distance.hpp"
 
@@ -17,155 +16,176 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace prolate {
-namespace {
 
-// What holds a solid: an exact tree is the solid, of another all levels cover it.
-TreeView outer_cover(const TreeView& tree, uint32_t level) {
-    return tree.has_triangles() ? tree : tree.coarser(level);
+Solid::Solid(const TreeView& tree, uint32_t max_level) noexcept
+    : outer_(tree.has_triangles() ? tree : tree.coarser(max_level)), inner_(tree.inner()) {
+    if (inner_) inner_ = inner_->coarser(max_level);
 }
-// What lies in it.
-std::optional<TreeView> inner_cover(const TreeView& tree, uint32_t level) {
-    if (const auto inner = tree.inner()) return inner->coarser(level);
-    return tree.has_triangles() ? std::optional(tree) : std::nullopt;
-}
-bool is_solid(const TreeView& tree) {
-    return tree.has_triangles() || !tree.is_exact(); // not a prefix of an exact tree
-}
+
+namespace query {
+namespace {
 
 // Do two leaves certainly come within `within` of each other? If it is negative: do they meet, even if one of them is
 // displaced by that much?
-bool come_within(const query::PlacedEllipsoid& a, const query::PlacedEllipsoid& b, double within) {
-    if (within == 0) return query::test_pair(a, b).verdict == query::PairVerdict::overlapping;
-    return (within > 0 ? query::distance_of(a, b, 0) : query::depth_of(a, b, 0)).upper <= within;
+bool certainly_within(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double within) {
+    if (within == 0) return test_pair(a, b).verdict == PairVerdict::overlapping;
+    return (within > 0 ? distance_of(a, b, 0) : depth_of(a, b, 0)).upper <= within;
 }
 // Here, some point x = c + L u + e of the triangle must lie in the ellipsoid, for which |u| + |e| / w <= 1 suffices, w
 // the smallest semi-axis. That also holds for the rounding of x itself.
-bool come_within(const query::PlacedTriangle& a, const query::PlacedEllipsoid& b, double within) {
-    const query::TriangleDistance d = query::distance(a, b);
+bool certainly_within(const PlacedTriangle& a, const PlacedEllipsoid& b, double within) {
+    const TriangleDistance d = distance(a, b);
     if (within > 0 && d.upper <= within) return true;
     const glm::dvec3 x = d.on_a - b.center, u = glm::inverse(b.factor) * x;
-    const double off = glm::length(x - b.factor * u) + query::kSeparationMargin * (a.reach + b.reach);
-    return glm::length(u) + (off - std::min(within, 0.0)) / query::least_width(b.factor, b.size) <= 1 - 0x1p-40;
+    const double off = glm::length(x - b.factor * u) + kSeparationMargin * (a.reach + b.reach);
+    return glm::length(u) + (off - std::min(within, 0.0)) / least_width(b.factor, b.size) <= 1 - 0x1p-40;
 }
 
-// Both bodies, and what of the budget is spent.
-struct Solids {
-    const TreeView &a, &b;
-    const Pose &pose_a, &pose_b;
-    const Scratch scratch;
-    const uint32_t level;
-    const uint64_t budget;
-    const query::RelativePose b_to_a = query::relative_pose(pose_a, pose_b);
-    QueryStats stats = {};
-    std::optional<TreeView> inner_a = {}, inner_b = {}; // once they are looked for
+// Is handed pairs of inner ellipsoids that meet.
+struct Deepest {
+    const CollideSearch& search;
+    double radii, depth = 0;
 
-    bool may_be_asked() const {
-        return is_solid(a) && is_solid(b) && query::suffices(scratch, a, b) && std::isfinite(b_to_a.distance);
-    }
-    bool are_triangles() const { return a.has_triangles() && b.has_triangles(); }
-    bool find_inner() {
-        inner_a = inner_cover(a, level);
-        if (inner_a) inner_b = inner_cover(b, level);
-        return inner_a && inner_b && query::suffices(scratch, *inner_a, *inner_b);
-    }
-
-    CollideResult collide(const TreeView& x, const TreeView& y, float margin) {
-        const CollideResult out =
-            prolate::collide(x, pose_a, y, pose_b, scratch,
-                             {.max_pair_tests = query::tests_left(budget, stats.tests()), .margin = margin});
-        query::add(out.stats, stats);
-        return out;
-    }
-    Verdict outer_meet(float margin) { return collide(outer_cover(a, level), outer_cover(b, level), margin).verdict; }
-
-    // Do the inner covers, or what takes their place, certainly come within the margin of each other, even if they are
-    // displaced by `uncertainty`? Undecided if the budget ended first.
-    Verdict inner_meet(float margin, float uncertainty) {
-        margin = query::sound_length(margin), uncertainty = query::sound_length(uncertainty);
-        // The pair that is named is as near as that, so that it is certain but for rounding.
-        const CollideResult found = collide(*inner_a, *inner_b, std::max(0.0f, margin - uncertainty));
-        if (found.verdict != Verdict::overlapping) return found.verdict;
-        const double within = double{margin} + inner_a->radius() + inner_b->radius() - double{uncertainty};
-        return come_within(found, within) ? Verdict::overlapping : Verdict::separated; // as far as can be told
-    }
-    bool come_within(const CollideResult& found, double within) const {
-        if (found.enclosed) return within >= 0 || leaves_hold_ball(-within);
-        const MeetingPair& pair = found.pair;
-        const auto ellipsoid_a = [&] { return query::place(inner_a->ellipsoid(pair.node_a), inner_a->scale()); };
-        const auto ellipsoid_b = [&] {
-            return query::place(inner_b->ellipsoid(pair.node_b), inner_b->scale(), b_to_a);
-        };
-        if (pair.triangle_a != kNoTriangle)
-            return prolate::come_within(query::place(*inner_a, pair.triangle_a), ellipsoid_b(), within);
-        if (pair.triangle_b != kNoTriangle)
-            return prolate::come_within(query::place(*inner_b, pair.triangle_b, b_to_a), ellipsoid_a(), within);
-        return prolate::come_within(ellipsoid_a(), ellipsoid_b(), within);
-    }
-
-    // Of ellipsoids among triangles: as no triangle meets them, their centers are at least that far from these.
-    bool leaves_hold_ball(double radius) const {
-        const TreeView& covers = inner_a->has_triangles() ? *inner_b : *inner_a;
-        bool all = true;
-        covers.for_each_in_cut(covers.level_count() - 1, [&](uint32_t node) {
-            const query::PlacedEllipsoid e = query::place(covers.ellipsoid(node), covers.scale());
-            all = all && query::least_width(e.factor, e.size) >= radius;
-        });
-        return all;
-    }
-
-    DistanceResult distance(const TreeView& x, const TreeView& y, DistanceOptions options) {
-        options.max_pair_tests = query::tests_left(budget, stats.tests());
-        options.max_level = kMaxLevels;
-        const DistanceResult out = prolate::distance(x, pose_a, y, pose_b, scratch, options);
-        query::add(out.stats, stats);
-        return out;
+    void look(const MeetingPair& pair) {
+        const PlacedEllipsoid a = place(search.a.tree.ellipsoid(pair.node_a), search.a.tree.scale()),
+                              b = place(search.b.tree.ellipsoid(pair.node_b), search.b.tree.scale(), search.b_to_a);
+        depth = std::max(depth, radii - distance_of(a, b, 0).upper);
     }
 };
 
 } // namespace
 
-SolidsResult collide_solids(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                            Scratch context, const SolidsOptions& options) noexcept {
-    Solids solids{a, b, pose_a, pose_b, context, options.max_level, options.max_pair_tests};
-    if (!solids.may_be_asked()) return {};
-    const auto answer = [&](Verdict verdict, bool out_of_budget = false) {
-        return SolidsResult{verdict, out_of_budget, solids.stats};
-    };
-    const Verdict outer = solids.outer_meet(
-        query::with_radius(query::sound_length(options.margin), double{query::sound_length(options.uncertainty)}));
-    if (outer != Verdict::overlapping || solids.are_triangles()) return answer(outer, outer == Verdict::undecided);
-    if (!solids.find_inner()) return answer(Verdict::undecided);
-    const Verdict inner = solids.inner_meet(options.margin, options.uncertainty);
-    return inner == Verdict::overlapping ? answer(inner) : answer(Verdict::undecided, inner == Verdict::undecided);
+bool SolidPair::may_be_asked() const noexcept {
+    return first_.is_known() && second_.is_known() && suffices(context_, bodies_.a, bodies_.b) &&
+           std::isfinite(b_to_a_.distance);
 }
 
-SolidsDistance distance_solids(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
-                               Scratch context, const DistanceOptions& options) noexcept {
-    Solids solids{a, b, pose_a, pose_b, context, options.max_level, options.max_pair_tests};
-    if (!solids.may_be_asked()) return {};
+bool SolidPair::have_inner() const noexcept {
+    return first_.inner() != nullptr && second_.inner() != nullptr && suffices(context_, inner_a(), inner_b());
+}
+
+Verdict SolidPair::outer_meet(float margin) noexcept {
+    margin = with_radius(margin, double{bodies_.a.radius()} + bodies_.b.radius());
+    if (left() > 0 && gap_of_spheres(bodies_.a, bodies_.b, b_to_a_) > margin) {
+        ++stats.pair_tests;
+        return Verdict::separated;
+    }
+    CollideSearch search(bodies_.a, bodies_.b, b_to_a_, context_, {.max_pair_tests = left(), .margin = margin});
+    const Verdict verdict = decide(search);
+    add(search.stats, stats);
+    return verdict;
+}
+
+Verdict SolidPair::inner_meet(float margin, float uncertainty) noexcept {
+    const double radii = double{inner_a().radius()} + inner_b().radius();
+    // The pair that is named is as near as that, so that it is certain but for rounding.
+    const float nearly = with_radius(std::max(0.0f, margin - uncertainty), radii);
+    CollideSearch search(inner_a(), inner_b(), b_to_a_, context_, {.max_pair_tests = left(), .margin = nearly});
+    MeetingPair pair;
+    search.pairs = {&pair, 1};
+    const Verdict verdict = decide(search);
+    add(search.stats, stats);
+    if (verdict != Verdict::overlapping) return verdict;
+    const double within = (double{margin} - double{uncertainty}) + radii;
+    return come_within(pair, search.found == 0, within) ? verdict : Verdict::separated; // as far as can be told
+}
+
+bool SolidPair::certainly_meet(MeetingPair pair, bool enclosed) const noexcept {
+    if (bodies_.exchanged) pair = exchanged(pair);
+    return come_within(pair, enclosed, double{inner_a().radius()} + inner_b().radius());
+}
+
+bool SolidPair::come_within(const MeetingPair& pair, bool enclosed, double within) const {
+    if (enclosed) return within >= 0 || leaves_hold_ball(-within);
+    const auto ellipsoid_a = [&] { return place(inner_a().ellipsoid(pair.node_a), inner_a().scale()); };
+    const auto ellipsoid_b = [&] { return place(inner_b().ellipsoid(pair.node_b), inner_b().scale(), b_to_a_); };
+    if (pair.triangle_a != kNoTriangle)
+        return certainly_within(place(inner_a(), pair.triangle_a), ellipsoid_b(), within);
+    if (pair.triangle_b != kNoTriangle)
+        return certainly_within(place(inner_b(), pair.triangle_b, b_to_a_), ellipsoid_a(), within);
+    return certainly_within(ellipsoid_a(), ellipsoid_b(), within);
+}
+
+// Of ellipsoids among triangles: as no triangle meets them, their centers are at least that far from these.
+bool SolidPair::leaves_hold_ball(double radius) const {
+    const TreeView& covers = inner_a().has_triangles() ? inner_b() : inner_a();
+    bool all = true;
+    covers.for_each_in_cut(covers.level_count() - 1, [&](uint32_t node) {
+        const PlacedEllipsoid e = place(covers.ellipsoid(node), covers.scale());
+        all = all && least_width(e.factor, e.size) >= radius;
+    });
+    return all;
+}
+
+double SolidPair::depth() noexcept {
+    if (!have_inner() || inner_a().has_triangles() || inner_b().has_triangles()) return 0;
+    const double radii = double{inner_a().radius()} + inner_b().radius();
+    CollideSearch search(inner_a(), inner_b(), b_to_a_, context_,
+                         {.max_pair_tests = left(), .margin = with_radius(0, radii)});
+    Deepest deepest{search, radii};
+    search.all = true;
+    search.each = [](void* user, const MeetingPair& pair) { static_cast<Deepest*>(user)->look(pair); };
+    search.each_user = &deepest;
+    traverse(search);
+    add(search.stats, stats);
+    return deepest.depth * (1 - 0x1p-50);
+}
+
+} // namespace query
+
+SolidsResult collide(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,
+                     const SolidsOptions& options) noexcept {
+    query::SolidPair pair(a, pose_a, b, pose_b, context, options.max_pair_tests);
+    if (!pair.may_be_asked()) return {};
+    const float margin = query::sound_length(options.margin), uncertainty = query::sound_length(options.uncertainty);
+    const float at_most = query::with_radius(margin, double{uncertainty});
+    if (pair.are_triangles()) {
+        const CollideResult exact = collide(a.outer(), pose_a, b.outer(), pose_b, context,
+                                            {.max_pair_tests = options.max_pair_tests, .margin = at_most});
+        return {exact.verdict, exact.verdict == Verdict::undecided, exact.stats};
+    }
+    Verdict verdict = pair.outer_meet(at_most);
+    bool out_of_budget = verdict == Verdict::undecided;
+    if (verdict == Verdict::overlapping) {
+        const Verdict inner = pair.have_inner() ? pair.inner_meet(margin, uncertainty) : Verdict::separated;
+        out_of_budget = inner == Verdict::undecided;
+        if (inner != Verdict::overlapping) verdict = Verdict::undecided;
+    }
+    return {verdict, out_of_budget, pair.stats};
+}
+
+SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,
+                        const DistanceOptions& options) noexcept {
+    query::SolidPair pair(a, pose_a, b, pose_b, context, options.max_pair_tests);
+    if (!pair.may_be_asked()) return {};
     SolidsDistance out;
-    const auto answer = [&] {
-        out.stats = solids.stats;
-        return out;
+    const auto ask = [&](const TreeView& x, const TreeView& y) {
+        DistanceOptions limits = options;
+        limits.max_level = kMaxLevels, limits.max_pair_tests = pair.left();
+        const DistanceResult found = distance(x, pose_a, y, pose_b, context, limits);
+        query::add(found.stats, pair.stats);
+        out.stats = pair.stats;
+        return found;
     };
-    const DistanceResult outer =
-        solids.distance(outer_cover(a, options.max_level), outer_cover(b, options.max_level), options);
+    const auto take_upper = [&](const DistanceResult& found) {
+        out.upper = found.upper, out.point_a = found.point_a, out.point_b = found.point_b;
+    };
+    const DistanceResult outer = ask(a.outer(), b.outer());
     out.lower = outer.lower;
+    if (pair.are_triangles()) {
+        out.verdict = outer.verdict;
+        take_upper(outer);
+        return out;
+    }
     if (outer.verdict == Verdict::separated) out.verdict = Verdict::separated;
-    if (solids.are_triangles()) {
-        out.verdict = outer.verdict, out.upper = outer.upper;
-        return answer();
-    }
-    if (out.lower >= query::sound_length(options.max_distance) || !solids.find_inner()) return answer();
-    if (out.lower == 0 && solids.inner_meet(0, 0) == Verdict::overlapping) {
+    if (out.lower >= query::sound_length(options.max_distance) || !pair.have_inner()) return out;
+    const DistanceResult inner = ask(*a.inner(), *b.inner());
+    take_upper(inner);
+    if (out.lower == 0 && inner.verdict == Verdict::overlapping && pair.certainly_meet(inner.pair, inner.enclosed))
         out.verdict = Verdict::overlapping, out.upper = 0;
-        return answer();
-    }
-    out.upper = solids.distance(*solids.inner_a, *solids.inner_b, options).upper;
-    return answer();
+    return out;
 }
 
 } // namespace prolate

@@ -104,6 +104,7 @@ static void test_pairs(void) {
     prolate_distance_result d = PROLATE_INIT(prolate_distance_result);
     CHECK_OK(prolate_distance(at(&box, 0, 0, 0), at(&box, 3, 0, 0), scratch, scratch_size, NULL, &d));
     CHECK(d.verdict == PROLATE_SEPARATED && d.lower <= 2 && d.upper >= 2 && d.upper - d.lower < 1e-5);
+    CHECK(fabsf(d.point_a.x - 0.5f) < 1e-5f && fabsf(d.point_b.x - 2.5f) < 1e-5f);
     CHECK(fabsf(d.normal.x - 1) < 1e-6f && fabsf(d.point_a.x - 0.5f) < 1e-6f);
     prolate_distance_options near = PROLATE_INIT(prolate_distance_options);
     near.max_distance = 0.5;
@@ -200,6 +201,16 @@ static void test_solids(void) {
     d.size = 4;
     CHECK_STATUS(prolate_distance_solids(at(&box, 0, 0, 0), at(&ball, 3, 0, 0), scratch, scratch_size, NULL, &d),
                  PROLATE_BAD_STRUCT);
+
+    prolate_manifolds manifolds = {0};
+    prolate_solids_contacts deep = PROLATE_INIT(prolate_solids_contacts);
+    const prolate_body here = at(&box, 0, 0, 0), near_it = at(&box, 0.9f, 0, 0);
+    CHECK_OK(prolate_contacts_solids(here, near_it, &manifolds, scratch, scratch_size, NULL, &deep));
+    CHECK(deep.verdict == PROLATE_OVERLAPPING && deep.depth_lower == 0 && manifolds.count == 1);
+    CHECK(deep.depth_upper > 0.0999 && deep.depth_upper < 0.11 && fabsf(deep.way_out.x) > 0.0999f);
+    CHECK_OK(prolate_contacts_solids(here, at(&box, 3, 0, 0), &manifolds, scratch, scratch_size, NULL, &deep));
+    CHECK(deep.verdict == PROLATE_SEPARATED && deep.depth_upper == 0 && manifolds.count == 0);
+    CHECK_STATUS(prolate_contacts_solids(here, near_it, NULL, scratch, scratch_size, NULL, &deep), PROLATE_BAD_ARGUMENT);
 }
 
 static void test_one_body(void) {

@@ -113,8 +113,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     if (const auto deformation = tree.deformation())
         for (; modes < deformation->mode_count(); ++modes) q[modes] = deformation->range(modes);
     const auto ask = [&](const Pose& a, const Pose& b) {
-        const SolidsOptions limits{.max_level = options.max_level, .max_pair_tests = options.max_pair_tests};
-        require(collide_solids(tree, a, tree, b, context, limits).stats.tests() <= limits.max_pair_tests);
+        const Solid solid(tree, options.max_level);
+        const SolidsOptions limits{.max_pair_tests = options.max_pair_tests};
+        require(collide(solid, a, solid, b, context, limits).stats.tests() <= limits.max_pair_tests);
+        ContactManifolds of_solids;
+        require(contacts(solid, a, solid, b, of_solids, context, limits).stats.tests() <= limits.max_pair_tests);
         const DeformedBody moved{tree, a, {q, modes}};
         require(collide(moved, {tree, b}, context, options).stats.tests() <= options.max_pair_tests);
         const DeformedDistanceResult d = distance(

@@ -44,8 +44,9 @@ int main(int argc, char** argv) {
     const DistanceResult d = distance(tree, here, tree, far, context);
     row("distance.hpp", d.lower > 1 && d.lower <= d.upper && d.upper < 10);
 
-    const SolidsDistance apart = distance_solids(tree, here, tree, far, context);
-    row("solids.hpp", collide_solids(tree, here, tree, far, context).verdict == Verdict::separated &&
+    const Solid solid(tree);
+    const SolidsDistance apart = distance(solid, here, solid, far, context);
+    row("solids.hpp", collide(solid, here, solid, far, context).verdict == Verdict::separated &&
                           apart.verdict == Verdict::separated && apart.lower > 1 && apart.lower <= apart.upper);
 
     ContactManifolds manifolds;

@@ -9,9 +9,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
 
 namespace prolate {
 namespace {
@@ -19,8 +21,8 @@ namespace {
 using scenes::Random;
 
 // A solid three times: covers, triangles, and triangles with an inner cover.
-struct Solid {
-    explicit Solid(const Mesh& mesh)
+struct Baked {
+    explicit Baked(const Mesh& mesh)
         : covers(bake(mesh, false, 24)), exact(bake(mesh, true, 0)), exact_with_inner(bake(mesh, true, 24)) {}
     static Tree bake(const Mesh& mesh, bool exact, uint32_t inner) {
         BuildOptions options = quick(0);
@@ -35,12 +37,12 @@ Mesh cross() {
     shapes::append(mesh, shapes::moved(shapes::box(0.25f, 0.9f, 0.2f), {0.4f, 0, 0.1f}));
     return mesh;
 }
-const Solid& torus() {
-    static const Solid solid(shapes::torus(1, 0.3f, 24, 12));
+const Baked& torus() {
+    static const Baked solid(shapes::torus(1, 0.3f, 24, 12));
     return solid;
 }
-const Solid& crossed() {
-    static const Solid solid(cross());
+const Baked& crossed() {
+    static const Baked solid(cross());
     return solid;
 }
 
@@ -57,8 +59,8 @@ protected:
     QueryContext& context() { return *context_; }
 };
 
-static_assert(noexcept(collide_solids(std::declval<TreeView>(), Pose{}, std::declval<TreeView>(), Pose{},
-                                      std::declval<QueryContext&>())));
+static_assert(noexcept(collide(std::declval<Solid>(), Pose{}, std::declval<Solid>(), Pose{},
+                               std::declval<QueryContext&>())));
 
 TEST_F(Solids, CoversNeverContradictTriangles) {
     Random random(1);
@@ -66,20 +68,21 @@ TEST_F(Solids, CoversNeverContradictTriangles) {
     for (int i = 0; i < 3000; ++i) {
         const Pose a{{}, random.rotation()}, b = near_pose(random);
         const auto exact = collide(torus().exact.view(), a, crossed().exact.view(), b, context()).verdict;
-        const SolidsOptions options{.max_level = i % 4u == 3 ? kMaxLevels : static_cast<uint32_t>(i) % 4u};
-        const TreeView x = torus().covers.view(), y = crossed().covers.view();
-        const SolidsResult found = collide_solids(x, a, y, b, context(), options);
+        const uint32_t level = i % 4u == 3 ? kMaxLevels : static_cast<uint32_t>(i) % 4u;
+        const Solid x(torus().covers.view(), level), y(crossed().covers.view(), level);
+        const SolidsResult found = collide(x, a, y, b, context());
         if (found.verdict != Verdict::undecided) {
             ASSERT_EQ(found.verdict, exact) << i;
         }
         EXPECT_FALSE(found.out_of_budget);
-        if (options.max_level == kMaxLevels) ++counts[static_cast<int>(found.verdict)];
-        EXPECT_EQ(collide_solids(y, b, x, a, context(), options).verdict, found.verdict);
+        if (level == kMaxLevels) ++counts[static_cast<int>(found.verdict)];
+        EXPECT_EQ(collide(y, b, x, a, context()).verdict, found.verdict);
         // Triangles decide everything, with inner covers or without, and against covers as far as these do.
-        const TreeView with_inner = torus().exact_with_inner.view();
-        EXPECT_EQ(collide_solids(with_inner, a, crossed().exact_with_inner.view(), b, context()).verdict, exact);
-        EXPECT_EQ(collide_solids(torus().exact.view(), a, crossed().exact.view(), b, context()).verdict, exact);
-        const Verdict mixed = collide_solids(torus().exact.view(), a, y, b, context()).verdict;
+        const Solid with_inner(torus().exact_with_inner.view()), other_with_inner(crossed().exact_with_inner.view());
+        EXPECT_EQ(collide(with_inner, a, other_with_inner, b, context()).verdict, exact);
+        const Solid without(torus().exact.view()), other_without(crossed().exact.view());
+        EXPECT_EQ(collide(without, a, other_without, b, context()).verdict, exact);
+        const Verdict mixed = collide(without, a, y, b, context()).verdict;
         if (mixed != Verdict::undecided) {
             ASSERT_EQ(mixed, exact) << i;
         }
@@ -96,22 +99,28 @@ TEST_F(Solids, DistancesOfTrianglesLieBetweenTheBounds) {
     for (int i = 0; i < 600; ++i) {
         const Pose a{{}, random.rotation()}, b = near_pose(random);
         const DistanceResult exact = distance(torus().exact.view(), a, crossed().exact.view(), b, context());
-        const TreeView x = torus().covers.view(), y = crossed().covers.view();
+        const Solid x(torus().covers.view()), y(crossed().covers.view());
         for (const uint32_t level : {0u, 1u, kMaxLevels}) {
-            const SolidsDistance found =
-                distance_solids(x, a, y, b, context(), {.tolerance_relative = 1e-3, .max_level = level});
+            const Solid coarse_x(torus().covers.view(), level), coarse_y(crossed().covers.view(), level);
+            const SolidsDistance found = distance(coarse_x, a, coarse_y, b, context(), {.tolerance_relative = 1e-3});
             ASSERT_LE(found.lower, exact.upper + 1e-6) << i;
             ASSERT_GE(found.upper, exact.lower - 1e-6) << i;
             ASSERT_LE(found.lower, found.upper);
             EXPECT_EQ(found.verdict == Verdict::separated, found.lower > 0);
             EXPECT_EQ(found.verdict == Verdict::overlapping, found.upper == 0);
+            if (found.upper > 0) {
+                const auto apart = [](float p, float q) { return double{p} - double{q}; };
+                const Vec3 p = found.point_a, q = found.point_b;
+                EXPECT_NEAR(std::hypot(apart(p.x, q.x), apart(p.y, q.y), apart(p.z, q.z)), found.upper, 1e-5);
+            }
             if (level == 0) coarse_width += found.upper - found.lower;
             if (level == kMaxLevels) width += found.upper - found.lower;
         }
-        const SolidsDistance both = distance_solids(torus().exact.view(), a, crossed().exact.view(), b, context());
+        const SolidsDistance both =
+            distance(Solid(torus().exact.view()), a, Solid(crossed().exact.view()), b, context());
         EXPECT_EQ(both.lower, exact.lower);
         EXPECT_EQ(both.upper, exact.upper);
-        const SolidsDistance far = distance_solids(x, a, y, b, context(), {.max_distance = 0.01});
+        const SolidsDistance far = distance(x, a, y, b, context(), {.max_distance = 0.01});
         ASSERT_LE(far.lower, exact.upper + 1e-6);
         ASSERT_GE(far.upper, exact.lower - 1e-6);
     }
@@ -129,8 +138,8 @@ TEST_F(Solids, MarginsScalesAndRadii) {
         const auto changed = [&](const Tree& tree) { return *tree.view().scaled(scale)->rounded(radius); };
         for (float* x : {&b.translation.x, &b.translation.y, &b.translation.z}) *x *= scale;
         const auto exact = collide(changed(torus().exact), a, crossed().exact.view(), b, context(), {.margin = margin});
-        const auto found =
-            collide_solids(changed(torus().covers), a, crossed().covers.view(), b, context(), {.margin = margin});
+        const auto found = collide(Solid(changed(torus().covers)), a, Solid(crossed().covers.view()), b, context(),
+                                   {.margin = margin});
         if (found.verdict == Verdict::undecided) continue;
         ++decided;
         ASSERT_EQ(found.verdict, exact.verdict) << i;
@@ -144,10 +153,10 @@ TEST_F(Solids, UncertainPosesMayBeOffByThatMuch) {
     for (int i = 0; i < 600; ++i) {
         const Pose a{{}, random.rotation()}, b = near_pose(random);
         const float off = static_cast<float>(random.in(0, 0.02)), margin = i % 2 ? 0.0f : 0.03f;
-        const TreeView x = torus().covers.view(), y = crossed().covers.view();
-        const auto found = collide_solids(x, a, y, b, context(), {.margin = margin, .uncertainty = off});
+        const Solid x(torus().covers.view()), y(crossed().covers.view());
+        const auto found = collide(x, a, y, b, context(), {.margin = margin, .uncertainty = off});
         if (found.verdict == Verdict::undecided) {
-            fewer += collide_solids(x, a, y, b, context(), {.margin = margin}).verdict != Verdict::undecided;
+            fewer += collide(x, a, y, b, context(), {.margin = margin}).verdict != Verdict::undecided;
             continue;
         }
         ++decided;
@@ -170,48 +179,49 @@ TEST_F(Solids, WithoutInnerCoversNothingCertainlyMeets) {
     options.ellipsoids = 24;
     const Build plain = must_build(shapes::torus(1, 0.3f, 24, 12), options);
     const Pose here;
-    for (const TreeView& other : {plain.tree.view(), torus().covers.view()}) {
-        EXPECT_EQ(collide_solids(plain.tree.view(), here, other, here, context()).verdict, Verdict::undecided);
-        const SolidsDistance d = distance_solids(plain.tree.view(), here, other, here, context());
+    const Solid without(plain.tree.view());
+    for (const Solid& other : {without, Solid(torus().covers.view())}) {
+        EXPECT_EQ(collide(without, here, other, here, context()).verdict, Verdict::undecided);
+        const SolidsDistance d = distance(without, here, other, here, context());
         EXPECT_EQ(d.verdict, Verdict::undecided);
         EXPECT_EQ(d.lower, 0);
         EXPECT_EQ(d.upper, std::numeric_limits<double>::infinity());
     }
     const Pose far{{10, 0, 0}, {}};
-    EXPECT_EQ(collide_solids(plain.tree.view(), here, plain.tree.view(), far, context()).verdict, Verdict::separated);
+    EXPECT_EQ(collide(without, here, without, far, context()).verdict, Verdict::separated);
 }
 
 TEST_F(Solids, PrefixesOfExactTreesAreNoSolids) {
-    const TreeView prefix = torus().exact.view().coarser(1);
+    const Solid prefix(torus().exact.view().coarser(1)), other(crossed().covers.view());
     const Pose here, far{{100, 0, 0}, {}};
-    EXPECT_EQ(collide_solids(prefix, here, crossed().covers.view(), far, context()).verdict, Verdict::undecided);
-    EXPECT_EQ(distance_solids(prefix, here, crossed().covers.view(), far, context()).verdict, Verdict::undecided);
+    EXPECT_EQ(collide(prefix, here, other, far, context()).verdict, Verdict::undecided);
+    EXPECT_EQ(distance(prefix, here, other, far, context()).verdict, Verdict::undecided);
 }
 
 TEST_F(Solids, BudgetsAndBadPosesClaimNothingWrong) {
     Random random(4);
-    const TreeView x = torus().covers.view(), y = crossed().covers.view();
+    const Solid x(torus().covers.view()), y(crossed().covers.view());
     for (int i = 0; i < 300; ++i) {
         const Pose a{{}, random.rotation()}, b = near_pose(random);
-        const SolidsResult whole = collide_solids(x, a, y, b, context());
+        const SolidsResult whole = collide(x, a, y, b, context());
         for (const uint64_t budget : {0u, 1u, 20u, 60u, 200u}) {
-            const SolidsResult part = collide_solids(x, a, y, b, context(), {.max_pair_tests = budget});
+            const SolidsResult part = collide(x, a, y, b, context(), {.max_pair_tests = budget});
             EXPECT_LE(part.stats.tests(), budget);
             EXPECT_TRUE(part.verdict == whole.verdict || part.verdict == Verdict::undecided);
             if (part.verdict != whole.verdict) {
                 EXPECT_TRUE(part.out_of_budget);
             }
-            const SolidsDistance d = distance_solids(x, a, y, b, context(), {.max_pair_tests = budget});
+            const SolidsDistance d = distance(x, a, y, b, context(), {.max_pair_tests = budget});
             EXPECT_LE(d.stats.tests(), budget);
             EXPECT_LE(d.lower, d.upper);
         }
     }
     const float nan = std::numeric_limits<float>::quiet_NaN();
     for (const Pose& bad : {Pose{{nan, 0, 0}, {}}, Pose{{}, {0, 0, 0, 0}}})
-        for (const TreeView& other : {y, crossed().exact.view()}) {
-            EXPECT_EQ(collide_solids(x, bad, other, {}, context()).verdict, Verdict::undecided);
-            EXPECT_EQ(collide_solids(other, {}, x, bad, context()).verdict, Verdict::undecided);
-            const SolidsDistance d = distance_solids(x, bad, other, {}, context());
+        for (const Solid& other : {y, Solid(crossed().exact.view())}) {
+            EXPECT_EQ(collide(x, bad, other, {}, context()).verdict, Verdict::undecided);
+            EXPECT_EQ(collide(other, {}, x, bad, context()).verdict, Verdict::undecided);
+            const SolidsDistance d = distance(x, bad, other, {}, context());
             EXPECT_EQ(d.verdict, Verdict::undecided);
             EXPECT_EQ(d.lower, 0);
             EXPECT_EQ(d.upper, std::numeric_limits<double>::infinity());
@@ -230,7 +240,8 @@ TEST_F(Solids, TinyCoversMeetTrianglesOnlyWhereThatIsCertain) {
         int meet = 0;
         for (int i = 0; i < 300; ++i) {
             const Pose pose{{}, random.rotation()};
-            if (collide_solids(corner.view(), {}, tiny, pose, context()).verdict != Verdict::overlapping) continue;
+            if (collide(Solid(corner.view()), {}, Solid(tiny), pose, context()).verdict != Verdict::overlapping)
+                continue;
             ++meet;
             ASSERT_NE(collide(corner.view(), {}, exact, pose, context()).verdict, Verdict::separated) << size;
         }
@@ -239,9 +250,9 @@ TEST_F(Solids, TinyCoversMeetTrianglesOnlyWhereThatIsCertain) {
 }
 
 TEST_F(Solids, CoversWithinTrianglesMeetThemUnlessTheyMayBeDisplacedBeyondThem) {
-    const TreeView tiny = *torus().covers.view().scaled(0.05f), around = crossed().exact.view();
+    const Solid tiny(*torus().covers.view().scaled(0.05f)), around(crossed().exact.view());
     const auto verdict = [&](float uncertainty) {
-        return collide_solids(tiny, {}, around, {}, context(), {.uncertainty = uncertainty}).verdict;
+        return collide(tiny, {}, around, {}, context(), {.uncertainty = uncertainty}).verdict;
     };
     EXPECT_EQ(verdict(0), Verdict::overlapping);
     EXPECT_EQ(verdict(1e-6f), Verdict::overlapping);
@@ -250,12 +261,12 @@ TEST_F(Solids, CoversWithinTrianglesMeetThemUnlessTheyMayBeDisplacedBeyondThem) 
 
 TEST_F(Solids, LargerMarginsStayCertain) {
     Random random(6);
-    const TreeView x = torus().covers.view(), y = crossed().covers.view();
+    const Solid x(torus().covers.view()), y(crossed().covers.view());
     for (int i = 0; i < 1000; ++i) {
         const Pose a{{}, random.rotation()}, b = near_pose(random);
         const auto uncertainty = static_cast<float>(random.log_in(1e-3, 0.1));
         const auto verdict = [&](float margin) {
-            return collide_solids(x, a, y, b, context(), {.margin = margin, .uncertainty = uncertainty}).verdict;
+            return collide(x, a, y, b, context(), {.margin = margin, .uncertainty = uncertainty}).verdict;
         };
         const float margin = uncertainty * static_cast<float>(random.in(1, 3));
         ASSERT_TRUE(verdict(0) != Verdict::overlapping || verdict(margin) == Verdict::overlapping) << i;
@@ -263,12 +274,121 @@ TEST_F(Solids, LargerMarginsStayCertain) {
 }
 
 TEST_F(Solids, ScratchOfTheSizeThatIsNamedSuffices) {
-    const TreeView x = torus().covers.view(), y = crossed().covers.view();
-    std::vector<std::byte> memory(scratch_size(x, y));
+    const Solid x(torus().covers.view()), y(crossed().covers.view());
+    std::vector<std::byte> memory(scratch_size(torus().covers.view(), crossed().covers.view()));
     const Pose here, off{{0.8f, 0, 0}, {}};
-    EXPECT_EQ(collide_solids(x, here, y, off, Scratch(memory)).verdict,
-              collide_solids(x, here, y, off, context()).verdict);
-    EXPECT_EQ(collide_solids(x, here, y, off, Scratch(std::span(memory).first(64))).verdict, Verdict::undecided);
+    EXPECT_EQ(collide(x, here, y, off, Scratch(memory)).verdict, collide(x, here, y, off, context()).verdict);
+    EXPECT_EQ(collide(x, here, y, off, Scratch(std::span(memory).first(64))).verdict, Verdict::undecided);
+}
+
+// Sizes of 1 : 1e23: the order of the bodies must not decide what rounding leaves open.
+TEST_F(Solids, ChangingPlacesChangesNothing) {
+    Random random(7);
+    uint32_t decided = 0;
+    for (int i = 0; i < 4000; ++i) {
+        const auto scale = static_cast<float>(random.log_in(1e-11, 1e11)), other_scale = i % 2 ? scale : 1 / scale;
+        const auto radius = static_cast<float>(i % 3 == 0 ? random.in(0, 0.2) * double{scale} : 0);
+        const Solid x(*torus().covers.view().scaled(scale)->rounded(radius)),
+            y(*crossed().covers.view().scaled(other_scale));
+        const Pose a{{}, random.rotation()};
+        Pose b = near_pose(random);
+        for (float* t : {&b.translation.x, &b.translation.y, &b.translation.z}) *t *= std::max(scale, other_scale);
+        const SolidsOptions options{.margin = i % 5 == 0 ? 0.1f * scale : 0,
+                                    .uncertainty = i % 7 == 0 ? 1e-3f * scale : 0};
+        const Verdict verdict = collide(x, a, y, b, context(), options).verdict;
+        ASSERT_EQ(collide(y, b, x, a, context(), options).verdict, verdict) << i;
+        decided += verdict != Verdict::undecided;
+        const SolidsDistance d = distance(x, a, y, b, context()), back = distance(y, b, x, a, context());
+        ASSERT_EQ(d.verdict, back.verdict) << i;
+        ASSERT_EQ(d.lower, back.lower) << i;
+        ASSERT_EQ(d.upper, back.upper) << i;
+    }
+    EXPECT_GT(decided, 2000u);
+}
+
+TEST_F(Solids, DeeperLevelsNarrowTheBand) {
+    Random random(8);
+    double widths[3] = {};
+    for (int i = 0; i < 400; ++i) {
+        const Pose a{{}, random.rotation()}, b = near_pose(random);
+        SolidsDistance before;
+        for (uint32_t level = 0; level < 3; ++level) {
+            const Solid x(torus().covers.view(), level), y(crossed().covers.view(), level);
+            const SolidsDistance d = distance(x, a, y, b, context());
+            // Inner covers hold those of higher levels; outer ones need not lie in them.
+            ASSERT_LE(d.upper, before.upper * (1 + 1e-5)) << i;
+            ASSERT_TRUE(before.verdict != Verdict::overlapping || d.verdict == Verdict::overlapping) << i;
+            widths[level] += d.upper - d.lower;
+            before = d;
+        }
+    }
+    EXPECT_LT(widths[1], widths[0]);
+    EXPECT_LT(widths[2], widths[1]);
+}
+
+// No translation shorter than the lower bound takes the triangles apart, and the way out does.
+TEST_F(Solids, DepthsOfTrianglesLieBetweenTheBounds) {
+    Random random(9);
+    uint32_t deep = 0, ways = 0;
+    double lower = 0, upper = 0;
+    const Solid x(torus().covers.view()), y(crossed().covers.view());
+    const auto exact = [&](const Pose& a, const Pose& b) {
+        return collide(torus().exact.view(), a, crossed().exact.view(), b, context()).verdict;
+    };
+    const auto moved = [](Pose pose, const std::array<double, 3>& by) {
+        pose.translation.x += static_cast<float>(by[0]);
+        pose.translation.y += static_cast<float>(by[1]);
+        pose.translation.z += static_cast<float>(by[2]);
+        return pose;
+    };
+    for (int i = 0; i < 600; ++i) {
+        const Pose a{{}, random.rotation()}, b = near_pose(random);
+        ContactManifolds manifolds, of_covers;
+        const SolidsContacts found = contacts(x, a, y, b, manifolds, context());
+        ASSERT_EQ(found.verdict, collide(x, a, y, b, context()).verdict);
+        contacts(torus().covers.view(), a, crossed().covers.view(), b, of_covers, context());
+        ASSERT_EQ(manifolds.count, of_covers.count);
+        ASSERT_LE(found.depth_lower, found.depth_upper) << i;
+        EXPECT_EQ(found.depth_upper == 0, found.verdict == Verdict::separated);
+        if (found.depth_lower > 0) {
+            ++deep;
+            ASSERT_EQ(found.verdict, Verdict::overlapping) << i;
+            for (int k = 0; k < 8; ++k) {
+                const auto d = random.direction();
+                const double by = 0.999 * found.depth_lower;
+                ASSERT_EQ(exact(a, moved(b, {by * d[0], by * d[1], by * d[2]})), Verdict::overlapping) << i;
+            }
+        }
+        const double length = std::hypot(found.way_out.x, found.way_out.y, found.way_out.z);
+        if (found.depth_upper > 0 && found.depth_upper < 1e9) {
+            ++ways;
+            EXPECT_NEAR(length, found.depth_upper, 1e-6);
+            const Vec3 by = found.way_out;
+            ASSERT_EQ(exact(a, moved(b, {by.x, by.y, by.z})), Verdict::separated) << i;
+            if (found.depth_lower > 0) lower += found.depth_lower, upper += found.depth_upper;
+        } else {
+            EXPECT_EQ(length, 0);
+        }
+        for (const uint64_t budget : {0u, 5u, 50u, 300u}) {
+            ContactManifolds some;
+            const SolidsContacts part = contacts(x, a, y, b, some, context(), {.max_pair_tests = budget});
+            EXPECT_LE(part.stats.tests(), budget);
+            EXPECT_TRUE(part.verdict == found.verdict || part.verdict == Verdict::undecided);
+            EXPECT_LE(part.depth_lower, found.depth_upper);
+            EXPECT_GE(part.depth_upper, found.depth_lower);
+        }
+    }
+    EXPECT_GT(deep, 100u);
+    EXPECT_GT(ways, 100u);
+    EXPECT_GT(lower, 0.1 * upper);
+    RecordProperty("lower_of_upper", std::to_string(lower / upper));
+    ContactManifolds manifolds;
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const SolidsContacts bad = contacts(x, {{nan, 0, 0}, {}}, y, {}, manifolds, context());
+    EXPECT_EQ(bad.verdict, Verdict::undecided);
+    EXPECT_EQ(bad.depth_lower, 0);
+    EXPECT_EQ(bad.depth_upper, std::numeric_limits<double>::infinity());
+    EXPECT_EQ(manifolds.count, 0u);
 }
 
 } // namespace
