@@ -93,10 +93,10 @@ static_assert(sizeof(prolate_manifolds) == sizeof(ContactManifolds) &&
               offsetof(prolate_manifold, points) == offsetof(Manifold, points) &&
               offsetof(prolate_contact_point, id) == offsetof(ContactPoint, id) &&
               offsetof(prolate_contact_point, impulse) == offsetof(ContactPoint, impulse));
-template <class Query> ContactResult with_manifolds(prolate_manifolds* manifolds, Query&& query) {
+template <class Query> auto with_manifolds(prolate_manifolds* manifolds, Query&& query) {
     ContactManifolds own;
     std::memcpy(static_cast<void*>(&own), manifolds, sizeof own);
-    const ContactResult out = query(own);
+    const auto out = query(own);
     std::memcpy(static_cast<void*>(manifolds), &own, sizeof own);
     return out;
 }

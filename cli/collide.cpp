@@ -7,6 +7,7 @@
 
 #include <prolate/collide.hpp>
 #include <prolate/distance.hpp>
+#include <prolate/solids.hpp>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -16,6 +17,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 namespace prolate::cli {
 namespace {
@@ -26,6 +28,9 @@ qx,qy,qz,qw of any length; B is rotated first. "separated" is certain. "overlapp
 they stick out, the solids may still be separated. For exact trees, it is about their triangles, or about a body
 inside the other. The distance is that of the same bodies, with certain bounds; the points are the nearest ones
 found, in the frame of A. Nodes are named by their slots in the file, as in "export".
+
+If both trees have inner covers ("bake --inner"), a further answer is about the solids, certain both ways: apart, meeting
+(and at least how deep), or within the band that covers leave open, with bounds of their distance.
 
 The exit code is 0 whatever the verdict. With --exit-code, 0 means separated, 1 overlapping, 6 undecided (--budget).
 
@@ -72,10 +77,53 @@ std::string distance_text(const DistanceResult& distance) {
                        point(distance.point_a), point(distance.point_b));
 }
 
-// Both answers to the one question.
+// What is certain of the solids.
+struct SolidsAnswer {
+    bool known = false; // both have inner covers
+    SolidsDistance distance;
+    SolidsContacts contacts;
+};
+SolidsAnswer ask_solids(const TreeView& tree_a, const TreeView& tree_b, const Pose& pose, QueryContext& context,
+                        const QueryOptions& options) {
+    if (!tree_a.inner() || !tree_b.inner()) return {};
+    const Solid a(tree_a, options.max_level), b(tree_b, options.max_level);
+    ContactManifolds manifolds;
+    return {true, distance(a, Pose{}, b, pose, context, {.max_pair_tests = options.max_pair_tests}),
+            contacts(a, Pose{}, b, pose, manifolds, context, {.max_pair_tests = options.max_pair_tests})};
+}
+
+nlohmann::ordered_json solids_json(const SolidsAnswer& solids) {
+    const auto finite = [](double x) { return std::isfinite(x) ? nlohmann::ordered_json(x) : nullptr; };
+    return {{"verdict", kVerdicts[static_cast<size_t>(solids.contacts.verdict)]},
+            {"lower", solids.distance.lower},
+            {"upper", finite(solids.distance.upper)},
+            {"depth_lower", solids.contacts.depth_lower},
+            {"depth_upper", finite(solids.contacts.depth_upper)}};
+}
+
+std::string solids_text(const SolidsAnswer& solids) {
+    const SolidsDistance& d = solids.distance;
+    const auto between = [](double lower, double upper) {
+        return std::isfinite(upper) ? fmt::format("{:.6g} to {:.6g}", lower, upper)
+                                    : fmt::format("at least {:.6g}", lower);
+    };
+    switch (solids.contacts.verdict) {
+    case Verdict::separated:
+        return fmt::format("solids: certainly apart, {}\n", between(d.lower, d.upper));
+    case Verdict::overlapping:
+        return fmt::format("solids: certainly meet, depth {}\n",
+                           between(solids.contacts.depth_lower, solids.contacts.depth_upper));
+    case Verdict::undecided:
+        break;
+    }
+    return fmt::format("solids: within the band, distance {}\n", between(d.lower, d.upper));
+}
+
+// All answers to the one question.
 struct Answer {
     CollideResult collide;
     DistanceResult distance;
+    SolidsAnswer solids;
 };
 
 std::string as_json(const Answer& answer) {
@@ -90,6 +138,7 @@ std::string as_json(const Answer& answer) {
     out["triangle_a"] = triangle(result.pair.triangle_a);
     out["triangle_b"] = triangle(result.pair.triangle_b);
     out["distance"] = distance_json(answer.distance);
+    if (answer.solids.known) out["solids"] = solids_json(answer.solids);
     out["enclosed"] = result.enclosed;
     out["pair_tests"] = result.stats.pair_tests;
     out["block_tests"] = result.stats.block_tests;
@@ -110,7 +159,7 @@ std::string as_text(const Answer& answer, const TreeView& tree_a, const TreeView
                    ? ": a part of one lies inside the other"
                    : fmt::format(": {} and {} meet", part(tree_a, result.pair.node_a, result.pair.triangle_a, 'A'),
                                  part(tree_b, result.pair.node_b, result.pair.triangle_b, 'B'));
-    return out + '\n' + distance_text(answer.distance) +
+    return out + '\n' + distance_text(answer.distance) + (answer.solids.known ? solids_text(answer.solids) : "") +
            fmt::format("{} pair tests, {} block tests, {} triangle tests, deepest level {}\n",
                        grouped(result.stats.pair_tests), grouped(result.stats.block_tests),
                        grouped(result.stats.triangle_tests), result.stats.deepest_level);
@@ -135,7 +184,8 @@ Outcome<ExitCode> run(const CollideArguments& a) {
     distance_options.max_pair_tests = options.max_pair_tests;
     QueryContext context;
     const Answer answer{collide(tree_a, Pose{}, tree_b, *pose, context, options),
-                        distance(tree_a, Pose{}, tree_b, *pose, context, distance_options)};
+                        distance(tree_a, Pose{}, tree_b, *pose, context, distance_options),
+                        ask_solids(tree_a, tree_b, *pose, context, options)};
     print(a.json ? as_json(answer) : as_text(answer, tree_a, tree_b));
     return a.exit_code ? kVerdictCodes[static_cast<size_t>(answer.collide.verdict)] : kDone;
 }

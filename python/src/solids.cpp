@@ -19,9 +19,10 @@ SolidsOptions options_of(const Limits& limits, double slack) {
 struct SolidBodies : Bodies {
     const Solid solid_a, solid_b;
 
-    SolidBodies(nb::handle a_, nb::handle poses_a, nb::handle b_, nb::handle poses_b, nb::handle order,
+    SolidBodies(nb::handle tree_a, nb::handle poses_a, nb::handle tree_b, nb::handle poses_b, nb::handle order,
                 const Limits& limits)
-        : Bodies(a_, poses_a, b_, poses_b, order), solid_a(a(), limits.max_level), solid_b(b(), limits.max_level) {}
+        : Bodies(tree_a, poses_a, tree_b, poses_b, order), solid_a(a(), limits.max_level),
+          solid_b(b(), limits.max_level) {}
 
     Verdict verdict_of(const PlacedBodies& at, QueryContext& context, const Limits& limits) const {
         return collide(solid_a, at.a, solid_b, at.b, context, options_of(limits, at.slack)).verdict;

@@ -357,6 +357,21 @@ TEST_F(Cli, AnInnerCoverThroughEveryCommand) {
     EXPECT_NE(run({"info", tree}).out.find("% of the solid; proved"), std::string::npos);
     EXPECT_NE(run({"verify", tree, mesh}).out.find("inner cover: inside the solid, proved"), std::string::npos);
 
+    const auto solids = [&](const char* pose) {
+        return Json::parse(run({"collide", tree, tree, "--pose", pose, "--json"}).out)["solids"];
+    };
+    const Json meeting = solids("0.1,0,0"), apart = solids("5,0,0");
+    EXPECT_EQ(meeting["verdict"], "overlapping");
+    EXPECT_EQ(meeting["upper"], 0);
+    EXPECT_GT(meeting["depth_lower"], 0);
+    EXPECT_EQ(apart["verdict"], "separated");
+    EXPECT_LE(apart["lower"], apart["upper"]);
+    EXPECT_EQ(apart["depth_upper"], 0);
+    EXPECT_NE(run({"collide", tree, tree}).out.find("\nsolids: certainly meet, depth "), std::string::npos);
+    EXPECT_NE(run({"collide", tree, tree, "--pose", "5,0,0"}).out.find("\nsolids: certainly apart, "),
+              std::string::npos);
+    EXPECT_NE(run({"collide", tree, tree, "--budget", "0"}).out.find("\nsolids: within the band"), std::string::npos);
+
     Mesh moved = peanut(8);
     for (Vec3& v : moved.vertices) v.x += 0.05f;
     const Outcome no = run({"verify", tree, file("moved.obj", obj_text(moved)), "--json"});
