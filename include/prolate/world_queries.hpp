@@ -15,6 +15,7 @@
 #include <prolate/jobs.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
+#include <prolate/solids.hpp>
 #include <prolate/sweep.hpp>
 #include <prolate/world.hpp>
 
@@ -57,6 +58,13 @@ Result<void> collide(const World& world, std::span<const BodyPair> pairs, std::s
 Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::span<DistanceResult> out,
                       const Workers& workers, const DistanceOptions& options = {},
                       std::span<OfPair<DistanceCache>> caches = {}) noexcept;
+
+/// Do the solids meet, and how far apart are they? As collide() and distance() of a Solid (solids.hpp). Over a
+/// half-space, a solid certainly meets it where a leaf of its inner cover reaches into it.
+Result<void> collide(const World& world, std::span<const BodyPair> pairs, std::span<SolidsResult> out,
+                     const Workers& workers, const SolidsOptions& options = {}) noexcept;
+Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::span<SolidsDistance> out,
+                      const Workers& workers, const DistanceOptions& options = {}) noexcept;
 
 /// When do they first meet, if body `id` moves by motions[id.index]? Where they are now does not matter, only
 /// Motion::start; of a half-space the motion is not used. `motions` are World::body_count() or more: enough for all

@@ -88,6 +88,24 @@ Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::
     return {};
 }
 
+Result<void> collide(const World& world, std::span<const BodyPair> pairs, std::span<SolidsResult> out,
+                     const Workers& workers, const SolidsOptions& options) noexcept {
+    if (const auto good = check(world, pairs, out.size(), SIZE_MAX, workers); !good) return good;
+    for_pairs(world, pairs, workers, [&](const BodyPair&, const Body& a, const Body& b, Scratch context, uint32_t i) {
+        out[i] = query::collide_solids(a, b, context, options);
+    });
+    return {};
+}
+
+Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::span<SolidsDistance> out,
+                      const Workers& workers, const DistanceOptions& options) noexcept {
+    if (const auto good = check(world, pairs, out.size(), SIZE_MAX, workers); !good) return good;
+    for_pairs(world, pairs, workers, [&](const BodyPair&, const Body& a, const Body& b, Scratch context, uint32_t i) {
+        out[i] = query::distance_solids(a, b, context, options);
+    });
+    return {};
+}
+
 Result<void> sweep(const World& world, std::span<const BodyPair> pairs, std::span<const Motion> motions,
                    std::span<SweepResult> out, const Workers& workers, const SweepOptions& options) noexcept {
     if (const auto good = check(world, pairs, out.size(), SIZE_MAX, workers); !good) return good;

@@ -26,6 +26,68 @@ CollideResult on_ground(const Body& body, const HalfSpace& ground, Scratch conte
     return {.verdict = r.verdict, .enclosed = false, .pair = {r.node, 0, r.triangle, kNoTriangle}, .stats = r.stats};
 }
 
+// A certified upper bound of the height of an ellipsoid's lowest point over the ground, metres; rounding as separated()
+// below has it.
+double lowest_at_most(const TreeView& tree, uint32_t node, const Pose& pose, const HalfSpace& ground) {
+    const PlacedEllipsoid e = place(tree.ellipsoid(node), tree.scale(), world_pose(pose));
+    const dvec3 n = to_double(ground.normal), unit = n / glm::length(n);
+    const double offset = ground.offset, height = glm::dot(unit, e.center) - glm::length(unit * e.factor) - offset;
+    return height - double{tree.radius()} + kSeparationMargin * (e.reach + std::abs(offset));
+}
+
+// A solid and the ground: the lower bound is that of its outer cover, the upper one that of the lowest leaf of the
+// inner cover.
+SolidsDistance solid_to_ground(const Body& body, const HalfSpace& ground, Scratch context,
+                               const DistanceOptions& options) {
+    const Solid solid(*body.tree());
+    SolidsDistance out;
+    if (!solid.is_known()) return out;
+    const auto ask = [&](const TreeView& tree) {
+        DistanceOptions limits = options;
+        limits.max_pair_tests = tests_left(options.max_pair_tests, out.stats.tests());
+        const DistanceResult found = prolate::distance(tree, body.pose, ground, context, limits);
+        add(found.stats, out.stats);
+        return found;
+    };
+    const auto take_upper = [&](const DistanceResult& found, double upper) {
+        out.upper = upper, out.point_a = found.point_a, out.point_b = found.point_b;
+    };
+    const DistanceResult outer = ask(solid.outer());
+    out.lower = outer.lower;
+    if (outer.verdict == Verdict::separated || solid.outer().has_triangles()) out.verdict = outer.verdict;
+    if (solid.outer().has_triangles()) take_upper(outer, outer.upper);
+    if (solid.outer().has_triangles() || solid.inner() == nullptr || out.lower >= sound_length(options.max_distance))
+        return out;
+    const DistanceResult inner = ask(*solid.inner());
+    if (!std::isfinite(inner.upper)) return out;
+    take_upper(inner, std::max(0.0, lowest_at_most(*solid.inner(), inner.pair.node_a, body.pose, ground)));
+    if (out.lower == 0 && out.upper == 0) out.verdict = Verdict::overlapping;
+    return out;
+}
+
+SolidsResult solid_on_ground(const Body& body, const HalfSpace& ground, Scratch context, const SolidsOptions& options) {
+    const Solid solid(*body.tree());
+    const double normal = glm::length(to_double(ground.normal));
+    if (!solid.is_known() || !(normal > 0) || !std::isfinite(normal + world_pose(body.pose).distance)) return {};
+    const float margin = sound_length(options.margin), uncertainty = sound_length(options.uncertainty);
+    const OverlapResult outer = prolate::overlap(
+        solid.outer(), body.pose, ground, context,
+        {.max_pair_tests = options.max_pair_tests, .margin = with_radius(margin, double{uncertainty})});
+    SolidsResult out{outer.verdict, outer.verdict == Verdict::undecided, outer.stats};
+    if (outer.verdict != Verdict::overlapping || solid.outer().has_triangles()) return out;
+    out.verdict = Verdict::undecided;
+    if (solid.inner() == nullptr) return out;
+    const DistanceResult inner =
+        prolate::distance(*solid.inner(), body.pose, ground, context,
+                          {.max_pair_tests = tests_left(options.max_pair_tests, out.stats.tests())});
+    add(inner.stats, out.stats);
+    const bool found = std::isfinite(inner.upper);
+    out.out_of_budget = !found;
+    if (found && lowest_at_most(*solid.inner(), inner.pair.node_a, body.pose, ground) + double{uncertainty} <= margin)
+        out.verdict = Verdict::overlapping;
+    return out;
+}
+
 // Bodies change places: of a result that names points, and of manifolds.
 void exchange(ContactManifolds& manifolds) {
     for (uint32_t i = 0; i < std::min(manifolds.count, kManifolds); ++i) {
@@ -122,6 +184,23 @@ DistanceResult distance(const Body& a, const Body& b, Scratch context, const Dis
     if (y == nullptr) return {};
     DistanceResult out = prolate::distance(*y, b.pose, *a.half_space(), context, options);
     exchange_bodies(out);
+    return out;
+}
+
+SolidsResult collide_solids(const Body& a, const Body& b, Scratch context, const SolidsOptions& options) noexcept {
+    const TreeView *x = a.tree(), *y = b.tree();
+    if (x != nullptr && y != nullptr) return prolate::collide(Solid(*x), a.pose, Solid(*y), b.pose, context, options);
+    if (x != nullptr) return solid_on_ground(a, *b.half_space(), context, options);
+    return y != nullptr ? solid_on_ground(b, *a.half_space(), context, options) : SolidsResult{};
+}
+
+SolidsDistance distance_solids(const Body& a, const Body& b, Scratch context, const DistanceOptions& options) noexcept {
+    const TreeView *x = a.tree(), *y = b.tree();
+    if (x != nullptr && y != nullptr) return prolate::distance(Solid(*x), a.pose, Solid(*y), b.pose, context, options);
+    if (x != nullptr) return solid_to_ground(a, *b.half_space(), context, options);
+    if (y == nullptr) return {};
+    SolidsDistance out = solid_to_ground(b, *a.half_space(), context, options);
+    std::swap(out.point_a, out.point_b);
     return out;
 }
 

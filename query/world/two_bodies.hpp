@@ -6,6 +6,7 @@
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/raycast.hpp>
+#include <prolate/solids.hpp>
 #include <prolate/sweep.hpp>
 #include <prolate/world.hpp>
 #include <prolate/world_queries.hpp>
@@ -16,6 +17,8 @@ CollideResult collide(const Body& a, const Body& b, Scratch context, const Query
                       PairCache* cache) noexcept;
 DistanceResult distance(const Body& a, const Body& b, Scratch context, const DistanceOptions& options,
                         DistanceCache* cache) noexcept;
+SolidsResult collide_solids(const Body& a, const Body& b, Scratch context, const SolidsOptions& options) noexcept;
+SolidsDistance distance_solids(const Body& a, const Body& b, Scratch context, const DistanceOptions& options) noexcept;
 ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds, Scratch context,
                        const QueryOptions& options) noexcept;
 SweepResult sweep(const Body& a, const Motion& motion_a, const Body& b, const Motion& motion_b, Scratch context,

@@ -6,6 +6,7 @@
 #include <prolate/collide.hpp>
 #include <prolate/primitives.hpp>
 #include <prolate/solids.hpp>
+#include <prolate/world_queries.hpp>
 
 #include <gtest/gtest.h>
 
@@ -14,6 +15,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace prolate {
 namespace {
@@ -389,6 +391,58 @@ TEST_F(Solids, DepthsOfTrianglesLieBetweenTheBounds) {
     EXPECT_EQ(bad.depth_lower, 0);
     EXPECT_EQ(bad.depth_upper, std::numeric_limits<double>::infinity());
     EXPECT_EQ(manifolds.count, 0u);
+}
+
+TEST_F(Solids, PairsOfAWorldAreAnsweredAsTwoSolids) {
+    Random random(10);
+    constexpr HalfSpace kFloor{{0, 0, 3}, -1.2f};
+    World covers = *World::create(), exact = *World::create();
+    ASSERT_TRUE(covers.insert({.shape = kFloor, .pose = {}}));
+    ASSERT_TRUE(exact.insert({.shape = kFloor, .pose = {}}));
+    for (uint32_t i = 0; i < 60; ++i) {
+        const Baked& baked = i % 2 == 0 ? torus() : crossed();
+        Pose pose = near_pose(random);
+        for (float* t : {&pose.translation.x, &pose.translation.y}) *t *= 3;
+        ASSERT_TRUE(covers.insert({.shape = baked.covers.view(), .pose = pose}));
+        ASSERT_TRUE(exact.insert({.shape = baked.exact.view(), .pose = pose}));
+    }
+    ASSERT_TRUE(covers.update_pairs());
+    ASSERT_TRUE(exact.update_pairs());
+    const auto pairs = covers.pairs();
+    std::vector<QueryContext> contexts(1);
+    const Workers workers{contexts};
+    std::vector<SolidsResult> found(pairs.size()), with_margin(pairs.size());
+    std::vector<SolidsDistance> apart(pairs.size());
+    std::vector<DistanceResult> wanted(pairs.size());
+    std::vector<CollideResult> wanted_with_margin(pairs.size());
+    ASSERT_TRUE(collide(covers, pairs, found, workers));
+    ASSERT_TRUE(collide(covers, pairs, with_margin, workers, {.margin = 0.2f, .uncertainty = 1e-4f}));
+    ASSERT_TRUE(distance(covers, pairs, apart, workers));
+    ASSERT_TRUE(distance(exact, pairs, wanted, workers)); // ids are the same in both
+    ASSERT_TRUE(collide(exact, pairs, wanted_with_margin, workers, {.margin = 0.2f}));
+    EXPECT_FALSE(collide(covers, pairs, std::span(found).first(1), workers));
+    uint32_t on_ground[3] = {}, others[3] = {};
+    for (size_t i = 0; i < pairs.size(); ++i) {
+        const Body &a = *covers.find(pairs[i].a), &b = *covers.find(pairs[i].b);
+        const bool ground = a.tree() == nullptr || b.tree() == nullptr;
+        ++(ground ? on_ground : others)[static_cast<int>(found[i].verdict)];
+        if (found[i].verdict != Verdict::undecided) {
+            ASSERT_EQ(found[i].verdict, wanted[i].verdict) << i;
+        }
+        if (with_margin[i].verdict != Verdict::undecided) {
+            ASSERT_EQ(with_margin[i].verdict, wanted_with_margin[i].verdict) << i;
+        }
+        EXPECT_EQ(apart[i].verdict, found[i].verdict) << i;
+        ASSERT_LE(apart[i].lower, wanted[i].upper + 1e-6) << i;
+        ASSERT_GE(apart[i].upper, wanted[i].lower - 1e-6) << i;
+        if (!ground) {
+            EXPECT_EQ(collide(Solid(*a.tree()), a.pose, Solid(*b.tree()), b.pose, context()).verdict, found[i].verdict);
+        }
+    }
+    for (const uint32_t verdict : {0u, 1u}) {
+        EXPECT_GT(on_ground[verdict], 5u);
+        EXPECT_GT(others[verdict], 20u);
+    }
 }
 
 } // namespace
