@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 
 namespace prolate::cli {
 namespace {
@@ -22,6 +23,13 @@ std::string known(const char* format, double value) {
 
 double percent(double length, double diagonal) {
     return diagonal > 0 ? 100 * length / diagonal : LevelFigures::kUnknown;
+}
+
+// Bytes of the section.
+size_t deformation_size(const TreeView& tree) {
+    for (uint32_t s = 0; s < tree.section_count(); ++s)
+        if (std::memcmp(tree.section(s).kind, "DFRM", 4) == 0) return tree.section(s).content.size();
+    return 0;
 }
 
 } // namespace
@@ -116,8 +124,8 @@ std::string modes_text(const TreeView& tree) {
     std::string ranges;
     for (uint32_t m = 0; m < modes->mode_count(); ++m)
         ranges += fmt::format("{}{:g}", m == 0 ? "" : ", ", modes->range(m));
-    return fmt::format("  deforms   by {} mode{}, coordinates within {}; proved\n", modes->mode_count(),
-                       modes->mode_count() == 1 ? "" : "s", ranges);
+    return fmt::format("  deforms   by {} mode{}, coordinates within {}; proved; {} bytes\n", modes->mode_count(),
+                       modes->mode_count() == 1 ? "" : "s", ranges, grouped(deformation_size(tree)));
 }
 
 nlohmann::ordered_json header_json(const TreeView& tree) {
@@ -127,6 +135,7 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["mode_ranges"] = nlohmann::ordered_json::array();
     if (const auto modes = tree.deformation())
         for (uint32_t m = 0; m < modes->mode_count(); ++m) out["mode_ranges"].push_back(modes->range(m));
+    out["modes_bytes"] = deformation_size(tree);
     out["nodes"] = tree.node_count();
     out["blocks"] = tree.block_count();
     out["bytes_per_node"] = bytes_per_node(tree);

@@ -1,11 +1,10 @@
 #include "cli/moving.hpp"
 
-#include "cli/bake/modes_file.hpp"
-
 #include <fmt/format.h>
 
 #include <array>
 #include <map>
+#include <utility>
 
 namespace prolate::cli {
 namespace {
@@ -27,8 +26,7 @@ std::vector<float> displacements_of(const TreeView& exact_tree) {
     return out;
 }
 
-Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& as_read,
-                                             const std::vector<Vec3>& vertices, const std::string& modes_path) {
+Outcome<ProvedModes> prove_modes(const TreeView& tree, const Mesh& as_read, const std::string& modes_path) {
     const auto deformation = tree.deformation();
     if (!deformation)
         return Failure{kUsage, modes_path, "the tree does not deform", "bake it with these --modes, or leave them out"};
@@ -38,18 +36,26 @@ Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& a
     if (!modes) return modes.error();
     const auto proof = verify_modes(tree, as_read.view(), modes->view());
     if (!proof) return failure_of(modes_path, proof.error());
-    if (!proof->proved)
+    return ProvedModes{std::move(*modes), *proof};
+}
+
+Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& as_read,
+                                             const std::vector<Vec3>& vertices, const std::string& modes_path) {
+    auto known = prove_modes(tree, as_read, modes_path);
+    if (!known) return known.error();
+    if (!known->proof.proved)
         return Failure{kBadInput, modes_path,
-                       fmt::format("mode {} is not one that the tree was baked with", proof->mode + 1),
+                       fmt::format("mode {} is not one that the tree was baked with", known->proof.mode + 1),
                        "give the file that bake had"};
+    const std::vector<float>& read = known->file.displacements;
     // All that are in one place move alike: the proof has seen to it.
     std::map<std::array<float, 3>, size_t> source;
     for (const Triangle& t : as_read.triangles)
         for (const uint32_t corner : t) source.emplace(place_of(as_read.vertices[corner]), corner);
     std::vector<float> out;
-    for (size_t m = 0; m < ranges.size(); ++m)
+    for (size_t m = 0; m < known->file.ranges.size(); ++m)
         for (const Vec3& v : vertices) {
-            const float* u = &modes->displacements[3 * (m * as_read.vertices.size() + source.at(place_of(v)))];
+            const float* u = &read[3 * (m * as_read.vertices.size() + source.at(place_of(v)))];
             out.insert(out.end(), u, u + 3);
         }
     return out;

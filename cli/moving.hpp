@@ -1,15 +1,26 @@
 // How the mesh of a tree that deforms moves.
 #pragma once
 
+#include "cli/bake/modes_file.hpp"
 #include "cli/failure.hpp"
 
 #include <prolate/mesh.hpp>
+#include <prolate/modes.hpp>
 #include <prolate/tree.hpp>
 
 #include <string>
 #include <vector>
 
 namespace prolate::cli {
+
+/// The modes of a file, in the ranges that the tree has, and what verify_modes() makes of them. `as_read` is the mesh
+/// that the tree was baked from, before it was cleaned. Fails where the tree has no deformation, or another number of
+/// modes.
+struct ProvedModes {
+    ModesFile file;
+    ModesProof proof;
+};
+Outcome<ProvedModes> prove_modes(const TreeView& tree, const Mesh& as_read, const std::string& modes_path);
 
 /// What a unit of each mode adds to each vertex of an exact tree that deforms: M by V by 3, metres.
 std::vector<float> displacements_of(const TreeView& exact_tree);

@@ -4,6 +4,7 @@
 #include "cli/grouped.hpp"
 #include "cli/inputs.hpp"
 #include "cli/mesh_options.hpp"
+#include "cli/moving.hpp"
 #include "cli/progress_line.hpp"
 #include "cli/threads.hpp"
 
@@ -14,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include <memory>
+#include <optional>
 
 namespace prolate::cli {
 namespace {
@@ -24,20 +26,25 @@ could not be proved. The mesh is read as when the tree was baked, with the same 
 tolerance, unless you give others. An open mesh has no certain inside, so only its triangles are proved to be
 covered. Of a tree baked with --fill, the filled solid is; of one with --keep-holes, the holes are proved to be free,
 too. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it. The ellipsoids of
-an inner cover (bake --inner) must lie inside the solid, or the exit code is 1.
+an inner cover (bake --inner) must lie inside the solid, or the exit code is 1. Of a tree that deforms, --modes proves
+that its nodes hold the mesh wherever these modes move it, within the tree's ranges; without, only the mesh at rest.
 
 Examples:
   prolate verify horse.etree horse.obj
-  prolate verify horse.etree horse.obj --json)";
+  prolate verify horse.etree horse.obj --json
+  prolate verify moving.etree horse.obj --modes modes.npz)";
 
 struct VerifyArguments {
-    std::string tree, mesh;
+    std::string tree, mesh, modes;
     MeshOptions mesh_options;
     uint32_t threads = 0;
     bool json = false;
 };
 
-std::string as_json(const VerifyReport& report, bool same_mesh) {
+// What is known of the tree's modes: nothing, if it has none, or none were given.
+using OfModes = std::optional<ModesProof>;
+
+std::string as_json(const VerifyReport& report, const OfModes& modes, bool same_mesh) {
     nlohmann::ordered_json out;
     out["covered"] = report.covered;
     out["surface_mode"] = report.surface_mode;
@@ -49,6 +56,8 @@ std::string as_json(const VerifyReport& report, bool same_mesh) {
     if (!report.holes_kept) out["blocked_at"] = report.blocked;
     out["inner_inside"] = report.has_inner ? nlohmann::ordered_json(report.inner_inside) : nullptr;
     if (!report.inner_inside) out["protruding_node"] = report.protruding_node;
+    out["modes_hold"] = modes ? nlohmann::ordered_json(modes->proved) : nullptr;
+    if (modes && !modes->proved) out["failing_mode"] = {{"mode", modes->mode}, {"node", modes->node}};
     out["baked_from_this_mesh"] = same_mesh;
     out["levels"] = nlohmann::ordered_json::array();
     for (const LevelProof& level : report.levels) {
@@ -66,7 +75,7 @@ std::string as_json(const VerifyReport& report, bool same_mesh) {
     return out.dump(2) + '\n';
 }
 
-std::string as_text(const VerifyReport& report) {
+std::string as_text(const VerifyReport& report, const OfModes& modes) {
     std::string out;
     for (size_t l = 0; l < report.levels.size(); ++l) {
         const LevelProof& level = report.levels[l];
@@ -96,6 +105,12 @@ std::string as_text(const VerifyReport& report) {
         out += report.inner_inside ? "inner cover: inside the solid, proved\n"
                                    : fmt::format("inner cover: node {} does NOT certainly lie inside the solid\n",
                                                  report.protruding_node);
+    if (modes)
+        out += modes->proved
+                   ? "modes: the nodes hold the mesh wherever they move it within the ranges, proved\n"
+                   : fmt::format("modes: node {} does NOT certainly hold the mesh as mode {} moves it, or the "
+                                 "tree was baked with another one\n",
+                                 modes->node, modes->mode + 1);
     if (report.surface_mode) out += "surface mode: the mesh is open, so the proof is about its triangles only\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;
@@ -107,6 +122,14 @@ Outcome<ExitCode> run(const VerifyArguments& a) {
     if (!tree) return tree.error();
     const auto mesh = read_mesh_of(tree->view(), a.mesh, a.mesh_options);
     if (!mesh) return mesh.error();
+    OfModes modes;
+    if (!a.modes.empty()) {
+        const auto known = prove_modes(tree->view(), mesh->as_read, a.modes);
+        if (!known) return known.error();
+        modes = known->proof;
+    } else if (tree->view().deformation()) {
+        note(a.tree, "this tree deforms, which is not proved without its modes; give --modes");
+    }
     const BakeInfo info = tree->view().bake_info();
     describe_mesh(a.mesh, mesh->cleaned.report, {.exact = info.exact, .filled = info.fill > 0});
     if (!mesh->own) note(a.tree, "this tree was baked from another mesh");
@@ -118,8 +141,8 @@ Outcome<ExitCode> run(const VerifyArguments& a) {
         return verify(tree->view(), mesh->as_read.view(), options);
     }();
     if (!report) return failure_of(a.mesh, report.error());
-    print(a.json ? as_json(*report, mesh->own) : as_text(*report));
-    return report->covered ? kDone : kNo;
+    print(a.json ? as_json(*report, modes, mesh->own) : as_text(*report, modes));
+    return report->covered && (!modes || modes->proved) ? kDone : kNo;
 }
 
 } // namespace
@@ -130,6 +153,8 @@ void add_verify(CLI::App& app, Work& chosen) {
     command->add_option("tree", a->tree, "the .etree file, or - for standard input")->required();
     command->add_option("mesh", a->mesh, "the mesh that it should cover, or - for standard input")->required();
     declare_mesh_options(*command, a->mesh_options, true);
+    command->add_option("--modes", a->modes,
+                        "how the mesh deforms, the file that bake had: proves that the nodes hold it");
     command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kVerifyFooter);

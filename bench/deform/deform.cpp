@@ -4,10 +4,11 @@
 //
 // BODY moves by M smooth modes (a bend, and waves along random directions; their ranges together move a vertex by about
 // A of the diagonal), OTHER is rigid and turned at random, near to where it first meets BODY at rest. Printed are the
-// median time of a query of covers and of exact trees, each at new coordinates and a new pose; and what FCL takes for
-// the first of these (if it was there at configure time): moving the vertices, refitting its trees of AABB, or for 50
-// of them of OBBRSS, and its query. The program fails if covers call separated what exact trees or FCL say meets, or
-// exact trees what FCL says does.
+// median thread CPU time of a query of covers and of exact trees, each at new coordinates and a new pose; and what FCL
+// and Coal take for the first of these, if they were there at configure time: moving the vertices, refitting their
+// trees of AABB, or for 50 of them of OBBRSS, and their query. The program fails if covers call separated what exact
+// trees or the other libraries say meets, or exact trees what these say does.
+#include "bench/deform/refit.hpp"
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
@@ -18,15 +19,12 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#ifdef PROLATE_BENCH_FCL
-#include <fcl/geometry/bvh/BVH_model.h>
-#include <fcl/math/bv/AABB.h>
-#include <fcl/math/bv/OBBRSS.h>
-#include <fcl/narrowphase/collision.h>
+#ifdef PROLATE_BENCH_COAL
+#include <dlfcn.h>
 #endif
+#include <time.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -36,7 +34,6 @@
 namespace prolate {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using scenes::Point;
 using scenes::Random;
 
@@ -46,8 +43,14 @@ struct Settings {
     std::string quality = "fast";
 };
 
-double microseconds(Clock::time_point since) {
-    return std::chrono::duration<double, std::micro>(Clock::now() - since).count();
+// Of this thread's CPU: the machine may have other work to do.
+double microseconds() {
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
+}
+double microseconds(double since) {
+    return microseconds() - since;
 }
 double median(std::vector<double> x) {
     if (x.empty()) return 0;
@@ -111,7 +114,7 @@ Tree bake(const Body& body, bool exact, const Settings& settings) {
     auto built = build(body.mesh.view(), options);
     if (!built) throw std::runtime_error(built.error().what);
     if (body.ranges.empty()) return std::move(built->tree);
-    const auto start = Clock::now();
+    const double start = microseconds();
     auto out = add_modes(built->tree.view(), body.mesh.view(), body.modes());
     if (!out) throw std::runtime_error(out.error().what);
     fmt::print("{}: {} bytes without modes, {} with; modes took {:.2f} s\n", exact ? "exact" : "cover",
@@ -159,7 +162,7 @@ Answers answer(const TreeView& body, const TreeView& other, const std::vector<Qu
     const auto context = std::make_unique<QueryContext>();
     std::vector<double> times;
     for (const Question& question : questions) {
-        const auto start = Clock::now();
+        const double start = microseconds();
         const DeformedCollideResult r = collide({body, {}, question.q}, {other, question.pose}, *context);
         times.push_back(microseconds(start));
         out.verdicts.push_back(r.verdict);
@@ -170,78 +173,73 @@ Answers answer(const TreeView& body, const TreeView& other, const std::vector<Qu
     return out;
 }
 
+// What distance() takes for them. False if a bound contradicts a verdict.
+bool measure_distances(const char* name, const TreeView& body, const TreeView& other,
+                       const std::vector<Question>& questions, const Answers& known) {
+    const auto context = std::make_unique<QueryContext>();
+    std::vector<double> times;
+    double tests = 0;
+    bool sound = true;
+    for (size_t i = 0; i < questions.size(); ++i) {
+        const double start = microseconds();
+        const DeformedDistanceResult r = distance({body, {}, questions[i].q}, {other, questions[i].pose}, *context);
+        times.push_back(microseconds(start));
+        tests += static_cast<double>(r.stats.tests()) / static_cast<double>(questions.size());
+        sound = sound && r.verdict == known.verdicts[i] && r.lower <= r.upper;
+    }
+    fmt::print("{}: distance in {:.1f} us, {:.1f} tests\n", name, median(times), tests);
+    return sound;
+}
+
+bench::RefitLibraries other_libraries() {
+    bench::RefitLibraries out;
 #ifdef PROLATE_BENCH_FCL
-template <class Volume> class Refitted {
-public:
-    using Model = fcl::BVHModel<Volume>;
-    Refitted(const Body& body, const Body& other)
-        : body_(body), points_(body.mesh.vertices.size()), moved_(points_.size()), model_(of(body.mesh)),
-          other_(of(other.mesh)) {}
-
-    bool meet(const Question& question) {
-        auto start = Clock::now();
-        body_.move(question.q, moved_);
-        for (size_t v = 0; v < moved_.size(); ++v) points_[v] = {moved_[v][0], moved_[v][1], moved_[v][2]};
-        moving.push_back(microseconds(start));
-        start = Clock::now();
-        model_->beginReplaceModel();
-        model_->replaceSubModel(points_);
-        model_->endReplaceModel(true, true);
-        refitting.push_back(microseconds(start));
-        const Quat& r = question.pose.rotation;
-        fcl::Transform3<double> at = fcl::Transform3<double>::Identity();
-        at.linear() = fcl::Quaternion<double>(r.w, r.x, r.y, r.z).normalized().toRotationMatrix();
-        at.translation() =
-            fcl::Vector3<double>(question.pose.translation.x, question.pose.translation.y, question.pose.translation.z);
-        start = Clock::now();
-        fcl::CollisionResult<double> result;
-        const bool out = fcl::collide(model_.get(), fcl::Transform3<double>::Identity(), other_.get(), at,
-                                      fcl::CollisionRequest<double>(), result) > 0;
-        asking.push_back(microseconds(start));
-        return out;
-    }
-    std::vector<double> moving, refitting, asking;
-
-private:
-    static std::unique_ptr<Model> of(const Mesh& mesh) {
-        auto out = std::make_unique<Model>();
-        std::vector<fcl::Vector3<double>> points;
-        for (const Vec3& v : mesh.vertices) points.emplace_back(v.x, v.y, v.z);
-        std::vector<fcl::Triangle> triangles;
-        for (const Triangle& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
-        out->beginModel();
-        out->addSubModel(points, triangles);
-        out->endModel();
-        return out;
-    }
-    const Body& body_;
-    std::vector<fcl::Vector3<double>> points_;
-    std::vector<Point> moved_;
-    std::unique_ptr<Model> model_, other_;
-};
+    add_fcl_refits(out);
+#else
+    fmt::print("FCL is skipped: libfcl-dev was not there at configure time\n");
+#endif
+#ifdef PROLATE_BENCH_COAL
+    void* const module = dlopen(PROLATE_BENCH_COAL, RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
+    void* const add = module != nullptr ? dlsym(module, "add_coal_refits") : nullptr;
+    if (add != nullptr)
+        reinterpret_cast<void (*)(bench::RefitLibraries&)>(add)(out);
+    else
+        fmt::print("Coal is skipped: {}\n", dlerror());
+#else
+    fmt::print("Coal is skipped: libcoal of PyPI was not there at configure time; ./run peers installs it\n");
+#endif
+    return out;
+}
 
 // Number of contacts that were missed.
-template <class Volume>
-uint32_t compare(const char* name, const Body& body, const Body& other, const std::vector<Question>& questions,
-                 const Answers& cover, const Answers& exact, size_t count) {
-    Refitted<Volume> refitted(body, other);
+uint32_t compare(const bench::RefitLibrary& library, const Body& body, const Body& other,
+                 const std::vector<Question>& questions, const Answers& cover, const Answers& exact, size_t most) {
+    const auto refitted = library.build(body.mesh, other.mesh);
+    const size_t count = std::min({size_t{library.most}, most, questions.size()});
+    std::vector<double> moving, refitting, asking;
+    std::vector<Point> moved(body.mesh.vertices.size());
     uint32_t missed = 0, meeting = 0, disagree = 0;
     for (size_t i = 0; i < count; ++i) {
-        const bool meet = refitted.meet(questions[i]);
+        double start = microseconds();
+        body.move(questions[i].q, moved);
+        moving.push_back(microseconds(start));
+        start = microseconds();
+        refitted->refit(moved);
+        refitting.push_back(microseconds(start));
+        start = microseconds();
+        const bool meet = refitted->meet(questions[i].pose);
+        asking.push_back(microseconds(start));
         meeting += meet;
         missed += meet && (cover.verdicts[i] == Verdict::separated || exact.verdicts[i] == Verdict::separated);
         disagree += meet != (exact.verdicts[i] == Verdict::overlapping);
     }
-    const double moving = median(refitted.moving), refit = median(refitted.refitting), asking = median(refitted.asking);
-    fmt::print(
-        "FCL, {}: {:.0f} us to move the vertices, {:.0f} to refit, {:.1f} to ask; refit and ask {:.0f} times the "
-        "cover's query, {:.0f} times the exact tree's\n",
-        name, moving, refit, asking, (refit + asking) / cover.time, (refit + asking) / exact.time);
-    fmt::print("  of {} questions {} meet; {} missed; exact trees and FCL disagree on {}\n", count, meeting, missed,
-               disagree);
+    const double refit = median(refitting), ask = median(asking);
+    fmt::print("{}: {:.0f} us to move the vertices, {:.0f} to refit, {:.1f} to ask; refit and ask {:.0f} times the "
+               "cover's query, {:.0f} times the exact tree's\n",
+               library.name, median(moving), refit, ask, (refit + ask) / cover.time, (refit + ask) / exact.time);
+    fmt::print("  of {} questions {} meet; {} missed; exact trees disagree on {}\n", count, meeting, missed, disagree);
     return missed;
 }
-#endif
 
 int run(const std::string& body_file, const std::string& other_file, const Settings& settings) {
     const auto read = [](const std::string& file) {
@@ -268,20 +266,17 @@ int run(const std::string& body_file, const std::string& other_file, const Setti
                100.0 * of_cover.separated / static_cast<double>(questions.size()));
     fmt::print("exact: {:.2f} us a query, {:.1f} tests, {:.1f} % separated\n", of_exact.time, of_exact.tests,
                100.0 * of_exact.separated / static_cast<double>(questions.size()));
+    bool sound = measure_distances("covers", cover.view(), other_cover.view(), questions, of_cover);
+    sound = measure_distances("exact", exact.view(), other_exact.view(), questions, of_exact) && sound;
+    if (!sound) fmt::print("distance() contradicts collide()\n");
     uint32_t missed = 0; // by covers, of what exact trees know
     for (size_t i = 0; i < questions.size(); ++i)
         missed += of_exact.verdicts[i] == Verdict::overlapping && of_cover.verdicts[i] == Verdict::separated;
     fmt::print("covers call separated {} of {} that meet by exact trees\n", missed,
                questions.size() - of_exact.separated);
-#ifdef PROLATE_BENCH_FCL
-    const size_t count = std::min<size_t>(settings.truth, questions.size());
-    missed += compare<fcl::AABB<double>>("AABB", body, other, questions, of_cover, of_exact, count);
-    missed +=
-        compare<fcl::OBBRSS<double>>("OBBRSS", body, other, questions, of_cover, of_exact, std::min<size_t>(count, 50));
-#else
-    fmt::print("FCL is skipped: it was not there at configure time\n");
-#endif
-    return missed == 0 ? 0 : 1;
+    for (const bench::RefitLibrary& library : other_libraries())
+        missed += compare(library, body, other, questions, of_cover, of_exact, settings.truth);
+    return missed == 0 && sound ? 0 : 1;
 }
 
 } // namespace
@@ -296,7 +291,7 @@ int main(int argc, char** argv) {
     app.add_option("--ellipsoids", settings.ellipsoids)->capture_default_str();
     app.add_option("--modes", settings.modes)->capture_default_str();
     app.add_option("--queries", settings.queries)->capture_default_str();
-    app.add_option("--truth", settings.truth, "queries that FCL is asked, too")->capture_default_str();
+    app.add_option("--truth", settings.truth, "queries that other libraries are asked, too")->capture_default_str();
     app.add_option("--amplitude", settings.amplitude, "of all modes together, part of the diagonal")
         ->capture_default_str();
     app.add_option("--quality", settings.quality)->capture_default_str();

@@ -407,13 +407,33 @@ TEST_F(Cli, BakeTakesModesFromNumpysFiles) {
     };
     const Outcome good = bake(file("u.npy", npy(shape, u)), {"--range", "0.5,2"});
     ASSERT_EQ(good.code, 0) << good.err;
-    EXPECT_NE(run({"info", tree}).out.find("by 2 modes, coordinates within 0.5, 2"), std::string::npos);
+    EXPECT_NE(run({"info", tree}).out.find("by 2 modes, coordinates within 0.5, 2; proved; "), std::string::npos);
     const Json info = Json::parse(run({"info", tree, "--json"}).out);
+    EXPECT_GT(info["modes_bytes"], 8 * 2 * 8);
+    // verify proves them, and notices others.
+    const Outcome blind = run({"verify", tree, mesh});
+    EXPECT_EQ(blind.code, 0);
+    EXPECT_NE(blind.err.find("not proved without its modes; give --modes"), std::string::npos) << blind.err;
+    const Outcome proved = run({"verify", tree, mesh, "--modes", file("u.npy")});
+    EXPECT_EQ(proved.code, 0) << proved.err;
+    EXPECT_NE(proved.out.find("modes: the nodes hold the mesh"), std::string::npos) << proved.out;
+    std::vector<float> further = u;
+    for (size_t i = 3 * vertices; i < further.size(); ++i) further[i] = 0.5f; // of the second mode
+    const Outcome refuted = run({"verify", tree, mesh, "--modes", file("v.npy", npy(shape, further)), "--json"});
+    EXPECT_EQ(refuted.code, 1) << refuted.err;
+    EXPECT_EQ(Json::parse(refuted.out)["modes_hold"], false);
+    EXPECT_EQ(Json::parse(refuted.out)["covered"], true);
+    const Outcome fewer =
+        run({"verify", tree, mesh, "--modes",
+             file("one.npy", npy("1, " + std::to_string(vertices) + ", 3", {u.begin(), u.begin() + 3 * vertices}))});
+    EXPECT_EQ(fewer.code, 3);
+    EXPECT_NE(fewer.err.find("one.npy"), std::string::npos) << fewer.err;
     EXPECT_EQ(info["mode_ranges"], (std::vector<double>{0.5, 2}));
     EXPECT_TRUE(info["unknown_sections"].empty());
     // The same options without modes are another file.
     EXPECT_EQ(run({"bake", mesh, "-o", tree, "--ellipsoids", "1", "--quality", "fast"}).code, 0);
     EXPECT_TRUE(Json::parse(run({"info", tree, "--json"}).out)["mode_ranges"].empty());
+    expect_failure(run({"verify", tree, mesh, "--modes", file("u.npy")}), 2, file("u.npy"), "does not deform");
 
     fs::remove(tree);
     u[7] = std::numeric_limits<float>::quiet_NaN();
