@@ -60,7 +60,8 @@ public:
         : a_(a), b_(b), r_(b.center - a.center), q1_(a.factor * glm::transpose(a.factor)),
           q2_(b.factor * glm::transpose(b.factor)), scale_(a.reach + b.reach), slack_(kSeparationMargin * scale_) {}
 
-    // Climbs g until the bounds meet, or until the bodies are known to overlap.
+    // Climbs g until the bounds meet, or until the bodies are known to overlap, or to be farther apart than decide_at_,
+    // or not.
     void climb(double tolerance, const dvec3& start_normal) {
         double rho = std::sqrt(trace(q1_) / trace(q2_)); // that of two spheres
         const double width = std::sqrt(trace(q1_) / 3);
@@ -68,7 +69,7 @@ public:
         best_.g = -kInfinity;
         if (glm::dot(start_normal, start_normal) > 0) {
             best_ = along(unit(start_normal));
-            if (out_.upper - out_.lower <= tolerance) return;
+            if (settled(tolerance)) return;
             rho = best_.a / best_.b, sigma = best_.a * std::max(best_.g, 0.0);
         }
         double low = 0, high = kInfinity; // bracket of Perram and Wertheim's rho, as long as no plane is found
@@ -77,7 +78,7 @@ public:
         bool substituted = false;
         while (out_.evaluations < kMaxNewtonEvaluations && propose(rho, sigma)) {
             const Along x = along(direction_);
-            if (out_.upper - out_.lower <= tolerance) return;
+            if (settled(tolerance)) return;
             const bool better = x.g > best_.g;
             if (better) best_ = x, best_rho = rho, best_sigma = sigma;
             if (!(best_.g > 0)) { // no plane yet: as in separation.cpp
@@ -104,8 +105,12 @@ public:
         }
         // One in a thousand pairs of thin bodies zigzags: their gap, which is concave around its maximum, is climbed
         // directly.
-        while (best_.g > 0 && out_.evaluations < kMaxGapEvaluations && out_.upper - out_.lower > tolerance)
+        while (best_.g > 0 && out_.evaluations < kMaxGapEvaluations && !settled(tolerance))
             if (!step_on_sphere(0)) return;
+    }
+
+    bool settled(double tolerance) const {
+        return out_.upper - out_.lower <= tolerance || out_.lower > decide_at_ || out_.upper <= decide_at_;
     }
 
     // Climbs from best_, where g < 0.
@@ -256,6 +261,7 @@ public:
     double tau_ = 0, det_ = 0, length_ = 0;
     dvec3 direction_;
     bool deep_ = false;
+    double decide_at_ = std::numeric_limits<double>::quiet_NaN(); // of climb(): all that is to be known
     Along best_{};
     Gap out_{-kInfinity, kInfinity, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0};
 };
@@ -280,7 +286,12 @@ Gap distance_of(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double toler
 }
 
 bool separated(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double margin) noexcept {
-    if (margin != 0) return distance_of(a, b, kDistanceTolerance * (margin + a.size + b.size)).lower > margin;
+    if (margin != 0) {
+        DirectionSearch search(a, b);
+        search.decide_at_ = margin;
+        search.climb(kDistanceTolerance * (margin + a.size + b.size), {0, 0, 0});
+        return search.out_.lower > margin;
+    }
     const PairVerdict verdict = test_pair(a, b).verdict;
     return verdict == PairVerdict::separated || (verdict == PairVerdict::unresolved && distance_of(a, b, 0).lower > 0);
 }
