@@ -3,15 +3,15 @@
 //   bench_solids MESH... [--ellipsoids N] [--inner N] [--poses N] [--quality fast|normal|best]
 //
 // A body meets itself: both are turned at random, and B comes along a random direction until the solids first meet, at
-// t, by bisection with exact trees. Poses are then t plus a random part of +-1, 5 or 20 % of the diagonal. Printed are,
-// for covers of ellipsoids and of as many spheres: the share of poses that collide() of solids decides, apart and
-// meeting; the time of a query; what a query costs if exact trees are asked where covers do not decide; the mean width
-// of the band that distance() of solids leaves, % of the diagonal; and the time of that, beside distance() of exact
-// trees, both with a tolerance of 0.1 %; and the time of contacts() of the covers alone and of the solids, and what the
-// bounds of the depth, where both are known, come to: the lower one's part of the upper one. Times are processor time
-// of the thread, means over all poses, the best of some rounds through all of them: each pose is another than the one
-// before, as in a program. Every decision and every bound is compared with those of the exact trees; the program fails
-// if one is wrong.
+// t, by bisection with exact trees. Poses are then t plus a random part of +-1, 5 or 20 % of the diagonal. Printed
+// are, for covers of ellipsoids and of as many spheres: the share of poses that collide() of solids decides, apart and
+// meeting; the time of a query, and how many blocks of nodes it tests; what a query costs if exact trees are asked
+// where covers do not decide; the mean width of the band that distance() of solids leaves, % of the diagonal; and the
+// time of that, beside distance() of exact trees, both with a tolerance of 0.1 %; and the time of contacts() of the
+// covers alone and of the solids, and what the bounds of the depth, where both are known, come to: the lower one's
+// part of the upper one. Times are processor time of the thread, means over all poses, the best of some rounds through
+// all of them: each pose is another than the one before, as in a program. Every decision and every bound is compared
+// with those of the exact trees; the program fails if one is wrong.
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
@@ -79,8 +79,9 @@ public:
                    "bytes {} and {}, exact {}\n",
                    outside(0), inside(0), outside(1), inside(1), covers_[0]->tree.bytes().size(),
                    covers_[1]->tree.bytes().size(), exact_->tree.bytes().size());
-        fmt::print("  {:>6} {:>10} {:>8} {:>8} {:>8} {:>8} {:>10} {:>8} {:>12} {:>18} {:>7}\n", "within", "covers",
-                   "decided", "apart", "meeting", "us", "us in all", "band %", "distance us", "contacts us", "depth");
+        fmt::print("  {:>6} {:>10} {:>8} {:>8} {:>8} {:>8} {:>7} {:>10} {:>8} {:>12} {:>18} {:>7}\n", "within",
+                   "covers", "decided", "apart", "meeting", "us", "blocks", "us in all", "band %", "distance us",
+                   "contacts us", "depth");
     }
 
     // False if an answer was wrong.
@@ -89,8 +90,10 @@ public:
         const TreeView exact = exact_->tree.view();
         std::vector<Verdict> truth;
         std::vector<DistanceResult> distances;
+        uint64_t blocks = 0;
         for (const Placed& p : poses) {
-            truth.push_back(collide(exact, p.a, exact, p.b, *context_).verdict);
+            const CollideResult met = collide(exact, p.a, exact, p.b, *context_);
+            truth.push_back(met.verdict), blocks += met.stats.block_tests;
             distances.push_back(distance(exact, p.a, exact, p.b, *context_, kDistance));
         }
         bool right = true;
@@ -102,9 +105,9 @@ public:
             time(poses, [&](const Placed& p) { return collide(exact, p.a, exact, p.b, *context_).verdict; });
         const double distance_us = time(
             poses, [&](const Placed& p) { return distance(exact, p.a, exact, p.b, *context_, kDistance).verdict; });
-        fmt::print("  {:>5.0f}% {:>10} {:>8} {:>8.3f} {:>8.3f} {:>8.2f} {:>10.2f} {:>8} {:>12.2f}\n", 100 * band,
-                   "exact", "", share(truth, Verdict::separated), share(truth, Verdict::overlapping), collide_us,
-                   collide_us, "", distance_us);
+        fmt::print("  {:>5.0f}% {:>10} {:>8} {:>8.3f} {:>8.3f} {:>8.2f} {:>7.1f} {:>10.2f} {:>8} {:>12.2f}\n",
+                   100 * band, "exact", "", share(truth, Verdict::separated), share(truth, Verdict::overlapping),
+                   collide_us, each(blocks, poses), collide_us, "", distance_us);
         print_levels(poses);
         return right;
     }
@@ -118,6 +121,9 @@ private:
     static double share(const std::vector<Verdict>& verdicts, Verdict of) {
         return static_cast<double>(std::count(verdicts.begin(), verdicts.end(), of)) /
                static_cast<double>(verdicts.size());
+    }
+    static double each(uint64_t count, const std::vector<Placed>& poses) {
+        return static_cast<double>(count) / static_cast<double>(poses.size());
     }
     // What each level of the ellipsoids decides, and how wide the band is there.
     void print_levels(const std::vector<Placed>& poses) {
@@ -186,9 +192,12 @@ private:
         std::vector<Verdict> verdicts;
         double width = 0, lower = 0, upper = 0;
         size_t wrong = 0;
+        uint64_t blocks = 0;
         for (size_t i = 0; i < poses.size(); ++i) {
             const Placed& p = poses[i];
-            const Verdict verdict = collide(solid, p.a, solid, p.b, *context_).verdict;
+            const SolidsResult met = collide(solid, p.a, solid, p.b, *context_);
+            const Verdict verdict = met.verdict;
+            blocks += met.stats.block_tests;
             wrong += verdict != Verdict::undecided && verdict != truth[i];
             verdicts.push_back(verdict);
             const SolidsDistance d = distance(solid, p.a, solid, p.b, *context_, kDistance);
@@ -206,10 +215,10 @@ private:
         };
         ContactManifolds kept;
         fmt::print(
-            "  {:>5.0f}% {:>10} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.2f} {:>10.2f} {:>8.2f} {:>12.2f} {:>8.1f}, "
+            "  {:>5.0f}% {:>10} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.2f} {:>7.1f} {:>10.2f} {:>8.2f} {:>12.2f} {:>8.1f}, "
             "{:>8.1f} {:>7.2f}\n",
             100 * band, name, 1 - share(verdicts, Verdict::undecided), share(verdicts, Verdict::separated),
-            share(verdicts, Verdict::overlapping), time(poses, of_solids), time(poses, in_all),
+            share(verdicts, Verdict::overlapping), time(poses, of_solids), each(blocks, poses), time(poses, in_all),
             100 * width / exact_->diagonal / static_cast<double>(poses.size()),
             time(poses,
                  [&](const Placed& p) { return distance(solid, p.a, solid, p.b, *context_, kDistance).verdict; }),
