@@ -92,6 +92,14 @@ Verdict SolidPair::inner_meet(float margin, float uncertainty) noexcept {
     return come_within(pair, search.found == 0, within) ? verdict : Verdict::separated; // as far as can be told
 }
 
+SolidsResult SolidPair::answer(Verdict outer, float margin, float uncertainty) noexcept {
+    if (outer != Verdict::overlapping || are_triangles()) return {outer, outer == Verdict::undecided, stats};
+    if (!have_inner()) return {Verdict::undecided, false, stats};
+    const Verdict inner = inner_meet(margin, uncertainty);
+    if (inner == Verdict::overlapping) return {inner, false, stats};
+    return {Verdict::undecided, inner == Verdict::undecided, stats};
+}
+
 bool SolidPair::certainly_meet(MeetingPair pair, bool enclosed) const noexcept {
     if (bodies_.exchanged) pair = exchanged(pair);
     return come_within(pair, enclosed, double{inner_a().radius()} + inner_b().radius());
@@ -141,19 +149,10 @@ SolidsResult collide(const Solid& a, const Pose& pose_a, const Solid& b, const P
     if (!pair.may_be_asked()) return {};
     const float margin = query::sound_length(options.margin), uncertainty = query::sound_length(options.uncertainty);
     const float at_most = query::with_radius(margin, double{uncertainty});
-    if (pair.are_triangles()) {
-        const CollideResult exact = collide(a.outer(), pose_a, b.outer(), pose_b, context,
-                                            {.max_pair_tests = options.max_pair_tests, .margin = at_most});
-        return {exact.verdict, exact.verdict == Verdict::undecided, exact.stats};
-    }
-    Verdict verdict = pair.outer_meet(at_most);
-    bool out_of_budget = verdict == Verdict::undecided;
-    if (verdict == Verdict::overlapping) {
-        const Verdict inner = pair.have_inner() ? pair.inner_meet(margin, uncertainty) : Verdict::separated;
-        out_of_budget = inner == Verdict::undecided;
-        if (inner != Verdict::overlapping) verdict = Verdict::undecided;
-    }
-    return {verdict, out_of_budget, pair.stats};
+    if (!pair.are_triangles()) return pair.answer(pair.outer_meet(at_most), margin, uncertainty);
+    const CollideResult exact = collide(a.outer(), pose_a, b.outer(), pose_b, context,
+                                        {.max_pair_tests = options.max_pair_tests, .margin = at_most});
+    return {exact.verdict, exact.verdict == Verdict::undecided, exact.stats};
 }
 
 SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,

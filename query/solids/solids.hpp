@@ -27,6 +27,8 @@ public:
 
     /// collide() of the outer covers.
     Verdict outer_meet(float margin) noexcept;
+    /// What collide() of solids answers, whose outer covers come within margin + uncertainty, or not: `outer`.
+    SolidsResult answer(Verdict outer, float margin, float uncertainty) noexcept;
     /// Do the inner covers, or what takes their place, certainly come within the margin of each other, even if they are
     /// displaced by `uncertainty`? Both sound lengths. Undecided if the budget ended first.
     Verdict inner_meet(float margin, float uncertainty) noexcept;
