@@ -102,9 +102,8 @@ struct SolidsContacts {
     /// translation after which the solids have no common inner point; 0 if they have none. `depth_upper` is infinite if
     /// no way out was found.
     double depth_lower = 0, depth_upper = std::numeric_limits<double>::infinity();
-    /// Moving `b` by it, world, metres, certainly separates the solids, however the sum is rounded to
-    /// floats; `depth_upper` is its length. 0 if they are
-    /// apart already, or if no way out was found.
+    /// Moving `b` by it, world, metres, certainly separates the solids, however the sum is rounded to floats;
+    /// `depth_upper` is its length. 0 if they are apart already, or if no way out was found.
     Vec3 way_out;
     uint64_t found = 0; ///< as ContactResult has it
     QueryStats stats;
