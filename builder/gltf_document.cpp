@@ -216,7 +216,10 @@ GltfValue GltfDocument::named(const char* array, const GltfValue& index) const {
 
 std::vector<double> GltfDocument::rows(const GltfValue& accessor_index, Rows kind) {
     const GltfValue accessor = named("accessors", accessor_index);
-    const std::string_view type = kind == Rows::scalar ? "SCALAR" : kind == Rows::vec3 ? "VEC3" : "VEC4";
+    const std::string_view type = kind == Rows::scalar ? "SCALAR"
+                                  : kind == Rows::vec3 ? "VEC3"
+                                  : kind == Rows::vec4 ? "VEC4"
+                                                       : "MAT4";
     if (accessor["type"].text() != type) accessor["type"].fail("an accessor of another type than its use needs");
     const Layout layout{.offset = accessor.whole("byteOffset", 0),
                         .component = accessor["componentType"].whole(),

@@ -38,6 +38,7 @@ public:
     /// The member, or `otherwise` if there is none.
     uint64_t whole(const char* member, uint64_t otherwise) const;
 
+    const std::string& place() const { return place_; }
     [[noreturn]] void fail(const char* what) const { throw GltfFailure{what, place_}; }
 
 private:
@@ -57,7 +58,7 @@ public:
     GltfValue named(const char* array, const GltfValue& index) const;
 
     /// How many numbers a row of an accessor has.
-    enum class Rows : uint64_t { scalar = 1, vec3 = 3, vec4 = 4 };
+    enum class Rows : uint64_t { scalar = 1, vec3 = 3, vec4 = 4, mat4 = 16 };
     /// The rows of an accessor, one after the other: sparse ones filled in, normalised integers as numbers.
     std::vector<double> rows(const GltfValue& accessor_index, Rows kind);
 

@@ -9,6 +9,7 @@
 
 #include <prolate/build.hpp>
 #include <prolate/mesh.hpp>
+#include <prolate/rig.hpp>
 
 #include <algorithm>
 #include <cerrno>
@@ -62,13 +63,14 @@ Reader reader_of(std::string_view type) {
     return nullptr;
 }
 
-Result<Polygons> read_polygons(const std::string& path, ImportReport& report) {
+Result<Polygons> read_polygons(const std::string& path, ImportReport& report, RiggedMesh* rig) {
     const std::string type = extension(path);
     const auto bytes = read_mesh_bytes(path.c_str());
     if (!bytes) return bytes.error();
     const bool is_gltf = type == ".gltf" || type == ".glb";
     const Reader reader = reader_of(type);
     if (!reader && !is_gltf) return Error{ErrorCode::bad_file, "unknown kind of mesh file"};
+    if (rig && !is_gltf) return Error{ErrorCode::bad_file, "only glTF files have skins and morph targets"};
     std::string_view content = *bytes;
     if (content.empty()) return Error{ErrorCode::bad_file, "the file is empty"};
     if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF"))
@@ -76,7 +78,7 @@ Result<Polygons> read_polygons(const std::string& path, ImportReport& report) {
     if (content.starts_with("version https://git-lfs"))
         return Error{ErrorCode::bad_file, "a pointer of Git LFS, not the file itself; fetch it with 'git lfs pull'"};
     if (content.starts_with("\xEF\xBB\xBF")) content.remove_prefix(3); // the mark of UTF-8
-    return is_gltf ? read_gltf(type, content, path, report) : reader(content, report.detail);
+    return is_gltf ? read_gltf(type, content, path, report, rig) : reader(content, report.detail);
 }
 
 struct Extent {
@@ -193,8 +195,8 @@ Result<void> check_finite(const Polygons& polygons, const ImportOptions& options
     return {};
 }
 
-Result<Mesh> load_or_throw(const char* path, const ImportOptions& options, ImportReport& report) {
-    auto polygons = read_polygons(path, report);
+Result<Mesh> load_or_throw(const char* path, const ImportOptions& options, ImportReport& report, RiggedMesh* rig) {
+    auto polygons = read_polygons(path, report, rig);
     if (!polygons) return polygons.error();
     report.notes = std::move(polygons->notes);
     if (polygons->sizes.empty()) return Error{ErrorCode::bad_file, "the file has no triangles"};
@@ -274,14 +276,17 @@ std::optional<uint64_t> hash_mesh_file(const char* path, const ImportOptions& op
     return {};
 }
 
-Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportReport* report,
-                       const std::function<bool()>& go_on) {
+namespace {
+
+// With what moves it, if that is asked for.
+Result<Mesh> load_mesh_of(const char* path, const ImportOptions& options, ImportReport* report,
+                          const std::function<bool()>& go_on, RiggedMesh* rig) {
     ImportReport unused;
     ImportReport& out = report ? *report : unused;
     if (const auto valid = check(options); !valid) return valid.error();
     try {
         out = {};
-        return Job(1, go_on).run([&] { return load_or_throw(path, options, out); });
+        return Job(1, go_on).run([&] { return load_or_throw(path, options, out, rig); });
     } catch (const Cancelled&) {
         return Error{ErrorCode::cancelled, "cancelled"};
     } catch (const std::bad_alloc&) {
@@ -295,6 +300,24 @@ Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportRep
     } catch (...) {
         return Error{ErrorCode::bad_file, "cannot be read as a mesh"};
     }
+}
+
+} // namespace
+
+Result<Mesh> load_mesh(const char* path, const ImportOptions& options, ImportReport* report,
+                       const std::function<bool()>& go_on) {
+    return load_mesh_of(path, options, report, go_on, nullptr);
+}
+
+Result<RiggedMesh> load_rigged_mesh(const char* path, const ImportOptions& options, ImportReport* report,
+                                    const std::function<bool()>& go_on) {
+    RiggedMesh out;
+    auto mesh = load_mesh_of(path, options, report, go_on, &out);
+    if (!mesh) return mesh.error();
+    out.mesh = std::move(*mesh);
+    for (size_t i = 0; i < out.displacements.size(); ++i)
+        out.displacements[i] = static_cast<float>(out.displacements[i] * out.mesh.placement.scale[i % 3]);
+    return out;
 }
 
 } // namespace prolate

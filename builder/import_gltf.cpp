@@ -4,8 +4,10 @@
 // A file that requires an extension which could change the surface, and is not handled here, is refused by name: its
 // positions would be compressed data, or missing.
 //
-// Known limits, which are noted: skins and morph targets are not applied.
+// A skinned mesh is taken in its bind pose, as its vertices are stored: its node's transform does not count (glTF 2.0,
+// 3.7.3.3). Known limits, which are noted: the joints' pose and the weights of morph targets are not applied.
 #include "builder/gltf_document.hpp"
+#include "builder/gltf_rig.hpp"
 #include "builder/job.hpp"
 #include "builder/polygons.hpp"
 
@@ -83,7 +85,7 @@ enum Mode : uint64_t { kTriangles = 4, kStrip = 5, kFan = 6 }; // less: points a
 
 class SceneReader {
 public:
-    explicit SceneReader(GltfDocument& document) : document_(document), root_(document.root()) {}
+    SceneReader(GltfDocument& document, GltfRig* rig) : document_(document), root_(document.root()), rig_(rig) {}
 
     Polygons read() {
         check_version_and_extensions(root_);
@@ -104,8 +106,9 @@ public:
             if (node.has("children")) push_nodes(node["children"], transform, todo);
         }
         note_count(left_out_, "points or lines are left out");
-        note_count(skinned_, "skinned meshes are taken at their nodes: joints do not move them");
+        note_count(skinned_, "skinned meshes are taken in their bind pose: neither joints nor their nodes move them");
         note_count(morphed_, "parts with morph targets are taken in their base shape");
+        if (rig_) rig_->finish(out_.points.size());
         return std::move(out_);
     }
 
@@ -117,6 +120,7 @@ private:
     struct Part { // of all points
         uint32_t first = 0;
         size_t count = 0;
+        std::string moved_by = {}; // as GltfRig::movers() says
     };
 
     void note_count(uint64_t count, const char* words) {
@@ -155,10 +159,12 @@ private:
 
     void add_node(const GltfValue& node, const Affine& transform) {
         if (!node.has("mesh")) return;
-        skinned_ += node.has("skin");
+        const bool skinned = node.has("skin");
+        skinned_ += skinned;
         const GltfValue mesh = document_.named("meshes", node["mesh"]);
+        if (rig_) rig_->begin(node, mesh);
         if (!node.has("extensions") || !node["extensions"].has("EXT_mesh_gpu_instancing"))
-            return add_mesh(mesh, transform);
+            return add_mesh(mesh, skinned ? Affine() : transform);
         for (const Affine& place : instances(node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]))
             add_mesh(mesh, transform * place);
     }
@@ -204,8 +210,17 @@ private:
             const GltfValue position = attributes["POSITION"];
             const auto [part, is_new] = parts.try_emplace(position.whole());
             if (is_new) part->second = add_points(position, transform);
+            if (rig_) add_to_rig(primitive, part->second, transform);
             add_triangles(primitive, mode, part->second, transform.mirrors());
         }
+    }
+
+    // Primitives that share points share what moves them.
+    void add_to_rig(const GltfValue& primitive, Part& part, const Affine& transform) {
+        if (part.moved_by == GltfRig::movers(primitive)) return;
+        if (!part.moved_by.empty()) primitive.fail("primitives that share positions, and not their weights");
+        part.moved_by = GltfRig::movers(primitive);
+        rig_->add(primitive, part.first, part.count, transform);
     }
 
     Part add_points(const GltfValue& position, const Affine& transform) {
@@ -249,16 +264,19 @@ private:
 
     GltfDocument& document_;
     const GltfValue root_;
+    GltfRig* const rig_;
     Polygons out_;
     uint64_t left_out_ = 0, skinned_ = 0, morphed_ = 0;
 };
 
 } // namespace
 
-Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path,
-                           ImportReport& report) try {
+Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path, ImportReport& report,
+                           RiggedMesh* rig) try {
     GltfDocument document(type, bytes, path, report.files);
-    return SceneReader(document).read();
+    if (!rig) return SceneReader(document, nullptr).read();
+    GltfRig reader(document, *rig);
+    return SceneReader(document, &reader).read();
 } catch (const GltfFailure& failure) {
     report.detail = failure.place;
     return Error{ErrorCode::bad_file, failure.what};

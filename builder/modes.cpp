@@ -1,11 +1,11 @@
 // add_modes(): for each node and mode, a ball around all U(x). Its center is the shift, and its radius the radius, or
-// where that is less the growth as seen from the node as the unit ball. (The center by the iteration of Badoiu and
-// Clarkson, "Smaller core-sets for balls", SODA 2003: an inexact one costs tightness only.) Shifts are rounded first,
+// where that is less the growth as seen from the node as the unit ball. Shifts are rounded first,
 // and growths measured from the rounded ones.
 #include <prolate/modes.hpp>
 
+#include "builder/ball.hpp"
 #include "builder/fit.hpp"
-#include "builder/moving_mesh.hpp"
+#include "builder/modal_mesh.hpp"
 #include "src/bytes.hpp"
 #include "src/deformation.hpp"
 #include "src/format.hpp"
@@ -21,7 +21,6 @@
 namespace prolate {
 namespace {
 
-constexpr int kBallSteps = 24;
 // Growths are this much larger than measured, relatively, and by this share of |L^-1| times the lengths that enter:
 // more than the inverse of a factor is wrong by (axis ratios reach 2^14), and far more than verify_modes() asks for.
 constexpr double kMargin = 1e-9, kInverseMargin = 1e-10;
@@ -34,27 +33,9 @@ struct NodeMotion {
     double growth = 0, radius = 0; // one of them is 0
 };
 
-// The middle of a ball around the points.
-Vec middle_of(std::span<const Vec> points) {
-    Box box;
-    for (const Vec& p : points) box.add(p);
-    Vec middle = box.center();
-    for (int i = 1; i <= kBallSteps; ++i) {
-        const auto nearer = [&](const Vec& p, const Vec& q) {
-            return (p - middle).squaredNorm() < (q - middle).squaredNorm();
-        };
-        middle += (*std::max_element(points.begin(), points.end(), nearer) - middle) / (i + 1);
-    }
-    return middle;
-}
-
-float round_up(double x) {
-    return x > 0 ? std::nextafter(static_cast<float>(x), HUGE_VALF) : 0.0f;
-}
-
 class Motions {
 public:
-    Motions(const TreeView& tree, const MovingMesh& mesh)
+    Motions(const TreeView& tree, const ModalMesh& mesh)
         : tree_(tree), mesh_(mesh), modes_(mesh.mode_count()), all_(size_t{tree.slot_count()} * modes_) {}
 
     // The content of the section.
@@ -82,7 +63,7 @@ public:
 private:
     template <class Visit> void for_each(Visit&& visit) {
         std::vector<Vec> u;
-        mesh_.for_each_node(tree_, [&](uint32_t node, std::span<const uint32_t> vertices) {
+        mesh_.mesh().for_each_node(tree_, [&](uint32_t node, std::span<const uint32_t> vertices) {
             if (vertices.empty()) return; // a leaf deep in the solid stands for no surface
             const Fit fit(tree_.bound(node));
             for (uint32_t m = 0; m < modes_; ++m) {
@@ -133,9 +114,7 @@ private:
 
     std::vector<std::byte> content() const {
         const bool exact = tree_.has_triangles();
-        std::vector<uint32_t> points = exact ? std::vector<uint32_t>(mesh_.vertices().size()) : mesh_.witnesses();
-        if (exact)
-            for (uint32_t v = 0; v < points.size(); ++v) points[v] = v;
+        const std::vector<uint32_t> points = mesh_.mesh().witnesses();
         const auto count = static_cast<uint32_t>(points.size());
         std::vector<std::byte> out(static_cast<size_t>(deformation_bytes(modes_, tree_.slot_count(), count, exact)));
         std::byte* to = out.data();
@@ -157,14 +136,14 @@ private:
             put(static_cast<uint16_t>(is_radius ? steps | kIsRadius : steps));
         }
         if (!exact)
-            for (const uint32_t v : points) put_point(mesh_.vertices()[v]);
+            for (const uint32_t v : points) put_point(mesh_.mesh().vertices()[v]);
         for (const uint32_t v : points)
             for (uint32_t m = 0; m < modes_; ++m) put_point(mesh_.displacement(v, m));
         return out;
     }
 
     const TreeView& tree_;
-    const MovingMesh& mesh_;
+    const ModalMesh& mesh_;
     const uint32_t modes_;
     std::vector<NodeMotion> all_; // by slots, then modes
     std::vector<float> shift_steps_, growth_steps_, radius_steps_;
@@ -172,7 +151,7 @@ private:
 
 Result<Tree> add(const TreeView& tree, MeshView mesh, const Modes& modes) {
     if (tree.deformation()) return Error{ErrorCode::unsupported, "the tree has a deformation already; bake it anew", 0};
-    const auto moving = MovingMesh::of(tree, mesh, modes);
+    const auto moving = ModalMesh::of(tree, mesh, modes);
     if (!moving) return moving.error();
     const auto content = Motions(tree, *moving).run();
     if (!content) return content.error();

@@ -5,7 +5,6 @@
 
 #include "builder/fit.hpp"
 #include "builder/triangle_tree.hpp"
-#include "src/deformation.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -20,26 +19,6 @@ constexpr double kMeetingMargin = 1e-9; // of the radial coordinate: triangles a
 
 Error bad_mesh(const char* what, uint64_t where) {
     return {ErrorCode::bad_mesh, what, where};
-}
-
-// Are the numbers by themselves such that a deformation can be made of them?
-Result<void> check(MeshView mesh, const Modes& modes) {
-    const size_t m = modes.ranges.size(), vertices = mesh.vertices.size();
-    if (m < 1 || m > kMaxModes) return Error{ErrorCode::bad_options, "a body deforms by 1 to 64 modes", m};
-    for (size_t i = 0; i < m; ++i)
-        if (!(modes.ranges[i] > 0 && std::isfinite(modes.ranges[i])))
-            return Error{ErrorCode::bad_options, "the range of a mode must be finite and above 0", i};
-    if (modes.displacements.size() != 3 * m * vertices)
-        return bad_mesh("the modes are of another number of vertices, or modes, than the mesh and the ranges; give a "
-                        "displacement for each vertex as it is read",
-                        vertices);
-    for (size_t i = 0; i < modes.displacements.size(); ++i) {
-        const float x = modes.displacements[i];
-        if (!std::isfinite(x)) return bad_mesh("vertex displacement is not finite; repair the modes", i / 3 % vertices);
-        if (std::abs(double{x}) * modes.ranges[i / (3 * vertices)] > double{kLargestCoordinate})
-            return bad_mesh("vertex moves beyond 1.9e22 m (2^74); give a smaller range", i / 3 % vertices);
-    }
-    return {};
 }
 
 Result<void> check(const TreeView& tree, const CleanMesh& cleaned) {
@@ -69,26 +48,24 @@ void make_set(std::vector<uint32_t>& numbers) {
 
 } // namespace
 
-Result<MovingMesh> MovingMesh::of(const TreeView& tree, MeshView mesh, const Modes& modes) {
+Result<MovingMesh> MovingMesh::of(const TreeView& tree, MeshView mesh, const Alike& alike) {
     auto cleaned = clean(mesh, tree.bake_info().weld);
     if (!cleaned) return cleaned.error();
-    if (const auto sound = check(mesh, modes); !sound) return sound.error();
     if (const auto sound = check(tree, *cleaned); !sound) return sound.error();
     MovingMesh out;
-    out.modes_ = modes;
-    out.input_vertices_ = mesh.vertices.size();
-    if (tree.has_triangles()) {
+    out.exact_ = tree.has_triangles();
+    if (out.exact_) {
         for (uint32_t v = 0; v < tree.vertex_count(); ++v) out.vertices_.push_back(tree.vertex(v));
         for (uint32_t t = 0; t < tree.triangle_count(); ++t) out.triangles_.push_back(tree.triangle(t));
     } else {
         out.vertices_ = std::move(cleaned->mesh.vertices), out.triangles_ = std::move(cleaned->mesh.triangles);
     }
-    if (const auto sound = out.find_sources(mesh); !sound) return sound.error();
+    if (const auto sound = out.find_sources(mesh, alike); !sound) return sound.error();
     return out;
 }
 
 // For each vertex one in its place of the mesh as read; all others there must move alike.
-Result<void> MovingMesh::find_sources(MeshView input) {
+Result<void> MovingMesh::find_sources(MeshView input, const Alike& alike) {
     std::vector<std::pair<Key, uint32_t>> places;
     for (const Triangle& t : input.triangles)
         for (const uint32_t corner : t) places.emplace_back(key_of(input.vertices[corner]), corner);
@@ -96,12 +73,10 @@ Result<void> MovingMesh::find_sources(MeshView input) {
     places.erase(std::unique(places.begin(), places.end()), places.end());
     for (size_t i = 1; i < places.size(); ++i) {
         if (places[i].first != places[i - 1].first) continue;
-        for (uint32_t m = 0; m < mode_count(); ++m)
-            if (input_displacement(modes_, places[i].second, m, input_vertices_) !=
-                input_displacement(modes_, places[i - 1].second, m, input_vertices_))
-                return bad_mesh("vertex moves otherwise than another one in one place, with which it is joined; "
-                                "give them the same displacements",
-                                places[i].second);
+        if (!alike(places[i].second, places[i - 1].second))
+            return bad_mesh("vertex moves otherwise than another one in one place, with which it is joined; let them "
+                            "move alike",
+                            places[i].second);
     }
     for (const Vec3& v : vertices_) {
         const auto found = std::lower_bound(places.begin(), places.end(), std::pair(key_of(v), uint32_t{0}));
@@ -115,6 +90,7 @@ Result<void> MovingMesh::find_sources(MeshView input) {
 std::vector<uint32_t> MovingMesh::witnesses() const {
     std::vector<uint32_t> parent(vertices_.size());
     std::iota(parent.begin(), parent.end(), 0u);
+    if (exact_) return parent;
     const auto root_of = [&](uint32_t v) {
         while (parent[v] != v) v = parent[v] = parent[parent[v]];
         return v;

@@ -17,6 +17,8 @@
 
 namespace prolate {
 
+struct RiggedMesh;
+
 using Point = std::array<double, 3>;
 
 /// An affine map in double precision, row by row: a product of many transforms rounds only here.
@@ -87,8 +89,9 @@ Result<Polygons> read_3ds(std::string_view bytes, std::string& detail);
 Result<Polygons> read_collada(std::string_view bytes, std::string& detail);
 Result<Polygons> read_3mf(std::string_view bytes, std::string& detail);
 /// `type` is the name's extension in lower case, with the dot; other files are sought beside `path`.
-Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path,
-                           ImportReport& report);
+/// With `rig`, all of that but its mesh is read, too.
+Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path, ImportReport& report,
+                           RiggedMesh* rig);
 /// The JSON of a glTF or GLB file; empty if there is none.
 std::string_view gltf_json(std::string_view type, std::string_view bytes);
 /// The path that a glTF's URI names: without %20 and the like.

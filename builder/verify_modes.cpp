@@ -6,7 +6,7 @@
 // ratios up to kMaxAxisRatio, 2^14, less than 2^-34 |y|, which kSolving pays for.
 #include <prolate/modes.hpp>
 
-#include "builder/moving_mesh.hpp"
+#include "builder/modal_mesh.hpp"
 #include "src/deformation.hpp"
 
 #include <cmath>
@@ -24,13 +24,12 @@ Vec solve(const Ellipsoid& e, const Vec& x) {
     return {u, v, (x.z() - e.l31 * u - e.l32 * v) / e.l33};
 }
 
-bool displacements_agree(const TreeView& tree, const Deformation& stored, const MovingMesh& mesh) {
-    const bool exact = tree.has_triangles();
-    const std::vector<uint32_t> witnesses = exact ? std::vector<uint32_t>() : mesh.witnesses();
-    if (stored.point_count() != (exact ? mesh.vertices().size() : witnesses.size())) return false;
+bool displacements_agree(const TreeView& tree, const Deformation& stored, const ModalMesh& mesh) {
+    const std::vector<uint32_t> witnesses = mesh.mesh().witnesses();
+    if (stored.point_count() != witnesses.size()) return false;
     for (uint32_t p = 0; p < stored.point_count(); ++p) {
-        const uint32_t v = exact ? p : witnesses[p];
-        if (!exact && stored.point(p) != mesh.vertices()[v]) return false;
+        const uint32_t v = witnesses[p];
+        if (!tree.has_triangles() && stored.point(p) != mesh.mesh().vertices()[v]) return false;
         for (uint32_t m = 0; m < mesh.mode_count(); ++m)
             if (stored.displacement(p, m) != mesh.displacement(v, m)) return false;
     }
@@ -40,14 +39,14 @@ bool displacements_agree(const TreeView& tree, const Deformation& stored, const 
 Result<ModesProof> prove(const TreeView& tree, MeshView mesh, const Modes& modes) {
     const std::optional<Deformation> stored = tree.deformation();
     if (!stored) return Error{ErrorCode::unsupported, "the tree has no deformation; bake it with its modes", 0};
-    const auto moving = MovingMesh::of(tree, mesh, modes);
+    const auto moving = ModalMesh::of(tree, mesh, modes);
     if (!moving) return moving.error();
     bool same = stored->mode_count() == moving->mode_count();
     for (uint32_t m = 0; same && m < stored->mode_count(); ++m) same = stored->range(m) == moving->range(m);
     if (!same) return Error{ErrorCode::bad_options, "the tree was baked with other modes or ranges", 0};
     if (!displacements_agree(tree, *stored, *moving)) return ModesProof{};
     ModesProof proof{.proved = true};
-    moving->for_each_node(tree, [&](uint32_t node, std::span<const uint32_t> vertices) {
+    moving->mesh().for_each_node(tree, [&](uint32_t node, std::span<const uint32_t> vertices) {
         const Ellipsoid bound = tree.bound(node);
         for (uint32_t m = 0; m < stored->mode_count(); ++m) {
             const Deformation::Motion motion = stored->motion(node, m);

@@ -27,7 +27,7 @@ endif()
 # All headers, but for the builder's where it is not built. eigen.hpp and tbb.hpp are for programs that have these.
 set(excluded_headers "")
 if(NOT PROLATE_BUILD_BUILDER)
-  set(excluded_headers REGEX "/(build|mesh|modes|verify)\\.hpp$" EXCLUDE)
+  set(excluded_headers REGEX "/(build|mesh|modes|rig|verify)\\.hpp$" EXCLUDE)
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/include/prolate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING PATTERN "*.hpp" PATTERN "*.h" ${excluded_headers})

@@ -12,6 +12,7 @@
 #include "src/hash.hpp"
 #include "src/hull.hpp"
 #include "src/layout.hpp"
+#include "src/skin.hpp"
 #include "src/slab.hpp"
 
 #include <prolate/version.hpp>
@@ -537,9 +538,16 @@ Result<void> TreeView::open_sections(size_t begin, bool check_hash) noexcept {
         const auto is = [&found](const char(&known)[4]) { return std::memcmp(found.kind, known, sizeof known) == 0; };
         const auto sound = is(kInnerKind)         ? open_inner(found.content, at, check_hash)
                            : is(kDeformationKind) ? open_deformation(found.content, at)
+                           : is(kSkinKind)        ? open_skin(found.content, at)
                                                   : Result<void>{}; // skipped, if it is not known
         if (!sound) return sound;
     }
+    const auto modes = deformation();
+    const auto bones = skin();
+    if (!modes || !bones || has_triangles()) return {};
+    bool same = modes->point_count() == bones->point_count();
+    for (uint32_t p = 0; same && p < bones->point_count(); ++p) same = modes->point(p) == bones->point(p);
+    if (!same) return bad("a skin of other points than the deformation's", sections_);
     return {};
 }
 
@@ -561,6 +569,14 @@ Result<void> TreeView::open_deformation(std::span<const std::byte> content, size
     if (const auto sound = check_deformation(content, *this); !sound)
         return bad(sound.error().what, at + kSectionContent + static_cast<size_t>(sound.error().where));
     modes_ = content;
+    return {};
+}
+
+Result<void> TreeView::open_skin(std::span<const std::byte> content, size_t at) noexcept {
+    if (!skin_.empty()) return bad("two skins", at);
+    if (const auto sound = check_skin(content, *this); !sound)
+        return bad(sound.error().what, at + kSectionContent + static_cast<size_t>(sound.error().where));
+    skin_ = content;
     return {};
 }
 

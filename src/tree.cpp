@@ -64,7 +64,7 @@ TreeView TreeView::coarser(uint32_t last) const noexcept {
     TreeView out = *this;
     out.bytes_ = bytes_.first(static_cast<size_t>(level(last).end_byte));
     out.is_prefix_ = true;
-    out.inner_ = out.modes_ = {}, out.section_count_ = 0;
+    out.inner_ = out.modes_ = out.skin_ = {}, out.section_count_ = 0;
     out.raw_.hulls_ = out.raw_.vertices_ = out.raw_.triangles_ = nullptr;
     out.raw_.has_slabs_ = false;
     out.vertex_count_ = out.triangle_count_ = out.component_count_ = 0;
@@ -108,6 +108,11 @@ std::optional<TreeView> TreeView::inner() const noexcept {
 std::optional<Deformation> TreeView::deformation() const noexcept {
     if (modes_.empty()) return std::nullopt;
     return Deformation(modes_, slot_count(), has_triangles());
+}
+
+std::optional<Skin> TreeView::skin() const noexcept {
+    if (skin_.empty()) return std::nullopt;
+    return Skin(skin_, slot_count(), has_triangles());
 }
 
 uint16_t TreeView::format_version() const noexcept {

@@ -1,11 +1,12 @@
-// Bodies that deform by modes: do they meet, how far apart are they, and where does a ray meet them? deformation.hpp
-// says how they deform.
+// Bodies that deform, by modes or by bones: do they meet, how far apart are they, and where does a ray meet them?
+// deformation.hpp and skin.hpp say how they deform.
 //
 // What a deforming body is, at coordinates q:
 //  - its surface: the triangles of its mesh, each with its corners where q moves them, and if the mesh is closed, all
 //    that this surface encloses. An exact tree is asked about these triangles; of a tree without triangles only their
 //    cover is known, the leaf ellipsoids as q moves and enlarges them.
-//  - A tree without deformation (or any tree, with no coordinates) is the rigid body of query.hpp.
+//  - A tree without deformation and skin (or any tree, with no coordinates and matrices) is the rigid body of
+//  query.hpp.
 //
 // What is certified:
 //  - separated:   the surfaces do not touch, and neither body holds a part of the other. Of the deformed mesh, whatever
@@ -18,9 +19,11 @@
 //  - undecided:   see Undecided.
 //
 // A query looks at no vertex but the corners of the triangles of exact leaves that it comes down to. It costs what it
-// opens: in double precision, node by node, about 0.2 us for each test and 10 ns more for each mode.
+// opens: in double precision, node by node, about 0.2 us for each test and 10 ns more for each mode, and
+// 30 ns for each bone that moves the node.
 //
-// TreeView::scaled() scales the displacements, too; TreeView::rounded() rounds the deformed body.
+// TreeView::scaled() scales the displacements and the bones' translations, too; TreeView::rounded() rounds the deformed
+// body.
 #pragma once
 
 #include <prolate/bounds.hpp>
@@ -33,17 +36,20 @@
 
 namespace prolate {
 
-/// A body at a pose, deformed. The coordinates are borrowed. None of them: all are 0.
+/// A body at a pose, deformed. Coordinates and matrices are borrowed. No coordinates: all are 0.
 struct DeformedBody {
     TreeView tree;
     Pose pose = {};
     std::span<const float> q = {}; ///< as many as the tree's deformation has modes, |q[i]| <= range(i)
+    /// As many as the tree's skin has bones; none of them: all are the identity. Finite, entries of at most
+    /// kLargestBoneFactor, translations of at most kLargestCoordinate.
+    std::span<const BoneMatrix> bones = {};
 };
 
 /// Why a query of deformed bodies decided nothing.
 enum class Undecided : uint8_t {
     no,          ///< it did decide
-    coordinates, ///< there are more or fewer than the tree has modes, or one is out of range or NaN: no bound holds
+    coordinates, ///< there are more or fewer than the tree has modes, or bones, or one is out of range or NaN
     input,       ///< a pose or a ray is not finite, or the scratch is too small
     budget,      ///< options.max_pair_tests ran out, or distance() was to look no deeper than options.max_level
 };

@@ -24,6 +24,7 @@
 #include <prolate/deformation.hpp>
 #include <prolate/detail/tree_bytes.hpp>
 #include <prolate/error.hpp>
+#include <prolate/skin.hpp>
 #include <prolate/types.hpp>
 
 #include <cstddef>
@@ -68,7 +69,7 @@ struct TriangleRange {
 
 /// What follows the tree in its file (src/FORMAT.md, "Sections").
 struct Section {
-    char kind[4];                       ///< printable; "INNR": an inner cover, "DFRM": a deformation
+    char kind[4];                       ///< printable; "INNR": an inner cover, "DFRM": a deformation, "SKIN"
     std::span<const std::byte> content; ///< of the file's bytes
 };
 
@@ -115,6 +116,8 @@ public:
     /// How the mesh deforms by modes, and what that does to the nodes, if the file says it: deform.hpp asks about
     /// bodies that deform. All other queries answer for the body at rest. Lengths are as stored, before scaled().
     std::optional<Deformation> deformation() const noexcept;
+    /// How bones move the mesh, and which of them each node, likewise.
+    std::optional<Skin> skin() const noexcept;
 
     /// Version of the format that the bytes are in.
     uint16_t format_version() const noexcept;
@@ -205,6 +208,7 @@ private:
     Result<void> open_sections(size_t begin, bool check_hash) noexcept;
     Result<void> open_inner(std::span<const std::byte> content, size_t at, bool check_hash) noexcept;
     Result<void> open_deformation(std::span<const std::byte> content, size_t at) noexcept;
+    Result<void> open_skin(std::span<const std::byte> content, size_t at) noexcept;
     static TreeView of_checked(std::span<const std::byte> bytes) noexcept;
     void count_levels(uint32_t count) noexcept;
     template <class Visit> void for_each_node_in(uint32_t begin, uint32_t end, Visit&& visit) const {
@@ -214,6 +218,7 @@ private:
     std::span<const std::byte> bytes_;
     std::span<const std::byte> inner_; // the file of the inner cover; empty without
     std::span<const std::byte> modes_; // the section of the deformation; empty without
+    std::span<const std::byte> skin_;  // that of the skin
     size_t sections_ = 0;              // where they begin
     detail::TreeBytes raw_;
     Ellipsoid root_, root_bound_;

@@ -8,34 +8,39 @@
 namespace prolate::query {
 
 Deformed::Deformed(const DeformedBody& body, uint32_t max_level) noexcept
-    : body_(body), modes_(body.tree.deformation()),
+    : body_(body), modes_(body.tree.deformation()), skin_(body.tree.skin()),
       limit_from_(max_level < body.tree.level_count() ? body.tree.first_slot(max_level) : UINT32_MAX) {
     in_range_ = body.q.empty() || (modes_ && body.q.size() == modes_->mode_count());
     for (uint32_t m = 0; in_range_ && m < body.q.size(); ++m) in_range_ = std::abs(body.q[m]) <= modes_->range(m);
+    if (body.bones.empty()) return;
+    in_range_ = in_range_ && skin_ && body.bones.size() == skin_->bone_count() && are_sound(body.bones);
+    if (in_range_) skinning_.emplace(*skin_, body.bones, double{body.tree.scale()});
 }
 
 bool Deformed::encloses() const noexcept {
-    return !tree().surface_mode() && (modes_.has_value() || tree().has_triangles());
+    return !tree().surface_mode() && (witness_count() > 0);
 }
 
 Bound Deformed::bound(uint32_t node) const noexcept {
     const double scale = tree().scale();
     Bound out{place(tree().bound(node), scale), 0};
     double moved = 0, grown = 1;
+    ModeShift by;
     for (uint32_t m = 0; m < body_.q.size(); ++m) {
         const double q = body_.q[m];
         if (q == 0) continue;
         const Deformation::Motion motion = modes_->motion(node, m);
         const glm::dvec3 shift = scale * q * glm::dvec3(motion.shift[0], motion.shift[1], motion.shift[2]);
-        out.core.center += shift;
+        out.core.center += shift, by.shift += shift;
         moved += glm::length(shift);
         grown += std::abs(q) * motion.growth;
         out.radius += scale * std::abs(q) * motion.radius;
     }
+    by.spread = (grown - 1) * out.core.size + out.radius;
     out.core.factor *= grown;
-    out.core.reach += moved + (grown - 1) * out.core.size + out.radius;
+    out.core.reach += moved + by.spread;
     out.core.size *= grown;
-    return out;
+    return skinning_ ? skinning_->moved(node, out, by) : out;
 }
 
 PlacedPoint Deformed::moved(const glm::dvec3& at_rest, uint32_t point) const noexcept {
@@ -47,7 +52,7 @@ PlacedPoint Deformed::moved(const glm::dvec3& at_rest, uint32_t point) const noe
         out.position += shift;
         out.reach += glm::length(shift);
     }
-    return out;
+    return skinning_ ? skinning_->moved(point, out) : out;
 }
 
 PlacedTriangle Deformed::triangle(uint32_t t) const noexcept {
@@ -63,12 +68,12 @@ PlacedTriangle Deformed::triangle(uint32_t t) const noexcept {
 
 uint32_t Deformed::witness_count() const noexcept {
     if (tree().has_triangles()) return tree().component_count();
-    return modes_ ? modes_->point_count() : 0;
+    return modes_ ? modes_->point_count() : skin_ ? skin_->point_count() : 0;
 }
 
 PlacedPoint Deformed::witness(uint32_t w) const noexcept {
     if (tree().has_triangles()) return moved(position(tree(), w), w);
-    return moved(to_double(modes_->point(w)) * double{tree().scale()}, w);
+    return moved(to_double(modes_ ? modes_->point(w) : skin_->point(w)) * double{tree().scale()}, w);
 }
 
 Bound place(const Bound& of_b, const RelativePose& b_to_a) noexcept {

@@ -5,9 +5,11 @@
 // (M + 1) u S, each product and each sum one rounding, and L (1 + sum |q_i| g_i) by (M + 2) u S; with what both bodies'
 // poses cost, 83 u S, p - a - b is wrong by less than 83 u S + 66 u S, within the 256 u S that is demanded there.
 // Triangles: 91 u S + 65 u S of 256 u S. Rays: 15 + 124 + 66 u S, and 66 u S more where the ray begins at a deformed
-// point; of triangles 352 + 4 * 65 u S. Twice the margins of query/raycast/ray.hpp are taken.
+// point; of triangles 352 + 4 * 65 u S. Twice the margins of query/raycast/ray.hpp are taken. Bones (skinning.hpp) pay
+// for what they add to nodes, and add 20 u S to points: 176 of 256 u S between triangles, 352 + 4 * 85 of 704 of rays.
 #pragma once
 
+#include "query/deform/skinning.hpp"
 #include "query/ellipsoid/placed.hpp"
 #include "query/triangle/placed.hpp"
 
@@ -19,12 +21,6 @@
 
 namespace prolate::query {
 
-/// All points within `radius` of an ellipsoid. The ellipsoid's reach counts it.
-struct Bound {
-    PlacedEllipsoid core;
-    double radius;
-};
-
 class Deformed {
 public:
     /// `body` must outlive it. Nodes from level `max_level` on stand for what is below them.
@@ -34,7 +30,6 @@ public:
     bool in_range() const noexcept { return in_range_; }
     const TreeView& tree() const noexcept { return body_.tree; }
     const Pose& pose() const noexcept { return body_.pose; }
-    bool deforms() const noexcept { return modes_.has_value(); }
     /// What lies inside of the body, beyond its leaf ellipsoids and triangles, belongs to it, too.
     bool encloses() const noexcept;
 
@@ -55,6 +50,8 @@ private:
 
     const DeformedBody& body_;
     std::optional<Deformation> modes_;
+    std::optional<Skin> skin_;
+    std::optional<Skinning> skinning_; ///< if there are matrices
     bool in_range_ = false;
     uint32_t limit_from_;
 };

@@ -11,7 +11,7 @@ cmake_minimum_required(VERSION 3.25)
 # Regular expressions. *_headers: public headers <prolate/NAME.hpp>. *_folders: internal headers "FOLDER/...".
 # *_libraries: other people's headers. The C++ standard library is always allowed.
 set(layers include/prolate src query builder capi viewer cli python)
-set(core_headers "types|error|mass|primitives|bake_info|deformation|detail/tree_bytes|tree|matrix|version")
+set(core_headers "types|error|mass|primitives|bake_info|deformation|skin|detail/tree_bytes|tree|matrix|version")
 set(posix "fcntl\\.h|unistd\\.h|sys/[a-z]+\\.h")
 
 set(include/prolate_headers ".*")
@@ -41,7 +41,7 @@ set(query/deform_knows "${query_geometry} raycast")
 set(query/contacts_knows "${query_geometry} collide")
 set(query/world_knows "${query_geometry} collide contacts distance sweep raycast shapes")
 
-set(builder_headers "${core_headers}|mesh|build|verify|modes")
+set(builder_headers "${core_headers}|mesh|build|verify|modes|rig")
 set(builder_folders "src|builder")
 set(builder_libraries "Eigen/.*|tbb/.*|oneapi/tbb/.*|xxhash\\.h|${posix}")
 
