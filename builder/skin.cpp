@@ -25,7 +25,7 @@ constexpr double kBallMargin = 1e-12;
 
 struct NodeBone {
     uint32_t bone = 0, weight = 0, spread = 0; // in kWeightSteps
-    Vec3 center;
+    Vec3 center = {};
     float radius = 0;
 };
 

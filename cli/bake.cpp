@@ -37,6 +37,10 @@ With --modes, the body deforms: at coordinates q, each vertex is moved by the su
 nodes are proved to hold it for every q within the ranges. Displacements are those of the vertices as the file has
 them, in its unit; vertices in one place must move alike. numpy.savez(path, modes=..., ranges=...) writes such a file.
 
+With --skin, the joints of a glTF's skins and its morph targets move the body: nodes hold it at *all* matrices of the
+bones, the joints' world matrices times their inverse bind matrices. The tree is that of the bind pose. Morph targets
+become modes, their weights within -1 and 1, or --range.
+
 With --exact, the tree goes down to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover
 the surface only, and queries answer for the triangles. 100,000 triangles take about a second, whatever the quality.
 
@@ -81,6 +85,7 @@ Examples:
   prolate bake part.dae -o part.etree --unit mm
   prolate bake horse.obj -o band.etree --ellipsoids 64 --inner 64                # from outside and from inside
   prolate bake horse.obj -o moving.etree --ellipsoids 64 --modes modes.npz       # deforms; or modes.npy --range 0.5
+  prolate bake hero.glb -o hero.etree --ellipsoids 64 --skin                     # moves by its bones
   prolate bake site.obj -o site.etree --recentre
   prolate bake horse.obj -o - | ssh robot 'cat > horse.etree'
   prolate bake --manifest assets.json
@@ -108,7 +113,7 @@ Outcome<ExitCode> run_one(BakeArguments& a) {
     if (baked->source == Source::cached) note(a.asset.output, "taken from the cache (--rebake bakes it again)");
     const std::string shown = a.json ? text_of(report_of(a.asset, *baked))
                                      : level_table(baked->tree.view(), baked->level_seconds) +
-                                           inner_text(baked->tree.view()) + modes_text(baked->tree.view());
+                                           inner_text(baked->tree.view()) + motion_text(baked->tree.view());
     if (is_quiet() && !a.json) return kDone;
     if (is_standard_output(a.asset.output))
         fmt::print(stderr, "{}", shown);

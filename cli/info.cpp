@@ -133,7 +133,7 @@ std::string as_text(const std::string& name, const TreeView& tree) {
                            0.01 * double{info.distance} * info.diagonal);
     if (info.keep_holes > 0) out += fmt::format("  asked     holes free for a ball of radius {:g}\n", info.keep_holes);
     if (!info.goal_reached) out += "  missed    what was asked could not be met at this resolution\n";
-    out += inner_text(tree) + modes_text(tree);
+    out += inner_text(tree) + motion_text(tree);
     for (const std::string& kind : unknown_sections(tree))
         out += fmt::format("  skipped   a section {}, which this version does not know\n", kind);
     out += fmt::format("  hashes    source {:016x}, options {:016x}\n", info.source_hash, info.options_hash);

@@ -106,6 +106,13 @@ Outcome<Mesh> read_mesh(const std::string& path, const ImportOptions& options) {
     return std::move(*mesh);
 }
 
+Outcome<RiggedMesh> read_rigged_mesh(const std::string& path, const ImportOptions& options) {
+    ImportReport report;
+    auto rigged = load_rigged_mesh(path.c_str(), options, &report, not_interrupted);
+    if (!rigged) return failure_of(path, rigged.error(), report.detail);
+    return std::move(*rigged);
+}
+
 Outcome<Tree> read_tree(const std::string& path) {
     const bool piped = is_standard_input(path);
     if (piped)

@@ -25,10 +25,10 @@ double percent(double length, double diagonal) {
     return diagonal > 0 ? 100 * length / diagonal : LevelFigures::kUnknown;
 }
 
-// Bytes of the section.
-size_t deformation_size(const TreeView& tree) {
+// Bytes of a section, by its kind.
+size_t section_size(const TreeView& tree, const char* kind) {
     for (uint32_t s = 0; s < tree.section_count(); ++s)
-        if (std::memcmp(tree.section(s).kind, "DFRM", 4) == 0) return tree.section(s).content.size();
+        if (std::memcmp(tree.section(s).kind, kind, 4) == 0) return tree.section(s).content.size();
     return 0;
 }
 
@@ -118,14 +118,19 @@ std::string inner_text(const TreeView& tree) {
                        grouped(inner->bytes().size()));
 }
 
-std::string modes_text(const TreeView& tree) {
-    const auto modes = tree.deformation();
-    if (!modes) return "";
-    std::string ranges;
-    for (uint32_t m = 0; m < modes->mode_count(); ++m)
-        ranges += fmt::format("{}{:g}", m == 0 ? "" : ", ", modes->range(m));
-    return fmt::format("  deforms   by {} mode{}, coordinates within {}; proved; {} bytes\n", modes->mode_count(),
-                       modes->mode_count() == 1 ? "" : "s", ranges, grouped(deformation_size(tree)));
+std::string motion_text(const TreeView& tree) {
+    std::string out;
+    if (const auto modes = tree.deformation()) {
+        std::string ranges;
+        for (uint32_t m = 0; m < modes->mode_count(); ++m)
+            ranges += fmt::format("{}{:g}", m == 0 ? "" : ", ", modes->range(m));
+        out += fmt::format("  deforms   by {} mode{}, coordinates within {}; proved; {} bytes\n", modes->mode_count(),
+                           modes->mode_count() == 1 ? "" : "s", ranges, grouped(section_size(tree, "DFRM")));
+    }
+    if (const auto skin = tree.skin())
+        out += fmt::format("  skinned   by {} bone{}, at all matrices; proved; {} bytes\n", skin->bone_count(),
+                           skin->bone_count() == 1 ? "" : "s", grouped(section_size(tree, "SKIN")));
+    return out;
 }
 
 nlohmann::ordered_json header_json(const TreeView& tree) {
@@ -135,7 +140,9 @@ nlohmann::ordered_json header_json(const TreeView& tree) {
     out["mode_ranges"] = nlohmann::ordered_json::array();
     if (const auto modes = tree.deformation())
         for (uint32_t m = 0; m < modes->mode_count(); ++m) out["mode_ranges"].push_back(modes->range(m));
-    out["modes_bytes"] = deformation_size(tree);
+    out["modes_bytes"] = section_size(tree, "DFRM");
+    out["bones"] = tree.skin() ? tree.skin()->bone_count() : 0;
+    out["skin_bytes"] = section_size(tree, "SKIN");
     out["nodes"] = tree.node_count();
     out["blocks"] = tree.block_count();
     out["bytes_per_node"] = bytes_per_node(tree);

@@ -29,8 +29,8 @@ nlohmann::ordered_json level_json(const TreeView& tree, uint32_t level);
 std::string inner_text(const TreeView& tree);
 nlohmann::ordered_json inner_json(const TreeView& tree);
 
-/// The deformation in one line; "" if there is none.
-std::string modes_text(const TreeView& tree);
+/// How modes and bones move the body, a line each; "" if nothing does.
+std::string motion_text(const TreeView& tree);
 
 /// All that the header says, and the inner cover.
 nlohmann::ordered_json header_json(const TreeView& tree);

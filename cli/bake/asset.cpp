@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 // The tree in the output file, if there is one to be looked at.
 std::optional<Tree> old_output(const Asset& a) {
     std::error_code none;
-    if (!a.modes.empty()) return {}; // of which the options' hash knows nothing
+    if (!a.modes.empty() || a.skin) return {}; // of which the options' hash knows nothing
     if (is_standard_output(a.output) || !fs::is_regular_file(a.output, none)) return {};
     auto tree = load(a.output.c_str());
     if (!tree) return {};
@@ -87,8 +87,31 @@ Outcome<Baked> make(const Asset& a, BakeCache& cache, bool rebake, const std::st
     return baked;
 }
 
-// Before a long bake: can the modes be read?
+// With the ranges of the command line, if there are any.
+Outcome<RiggedMesh> read_rigged(const Asset& a, const ImportOptions& import) {
+    auto rigged = read_rigged_mesh(a.mesh, import);
+    if (!rigged || a.ranges.empty()) return rigged;
+    const size_t modes = rigged->modes.size();
+    if (a.ranges.size() != 1 && a.ranges.size() != modes)
+        return Failure{kUsage, "--range",
+                       fmt::format("has {} values for {} morph targets of {}", a.ranges.size(), modes, a.mesh),
+                       "give one for all, or one each"};
+    rigged->ranges = a.ranges.size() == 1 ? std::vector<float>(modes, a.ranges[0]) : a.ranges;
+    return rigged;
+}
+
+// Before a long bake: can the modes and the skin be read?
 Outcome<> check_modes(const Asset& a) {
+    if (a.skin && !a.modes.empty())
+        return Failure{kUsage, "--skin", "takes the file's morph targets for modes", "give it, or --modes"};
+    if (a.skin && is_standard_input(a.mesh))
+        return Failure{kUsage, "--skin", "needs a mesh that can be read twice", "give the name of a file"};
+    if (a.skin) {
+        const auto import = import_options(a.mesh_options);
+        if (!import) return import.error();
+        const auto rigged = read_rigged(a, *import);
+        return rigged ? Outcome<>(kSuccess) : Outcome<>(rigged.error());
+    }
     if (a.modes.empty() && !a.ranges.empty())
         return Failure{kUsage, "--range", "says how far modes go, and there are none", "give --modes"};
     if (a.modes.empty()) return kSuccess;
@@ -98,11 +121,30 @@ Outcome<> check_modes(const Asset& a) {
     return modes ? Outcome<>(kSuccess) : Outcome<>(modes.error());
 }
 
+// Gives the tree what its glTF file says of morph targets and bones.
+Outcome<> rig(const Asset& a, const RiggedMesh& rigged, Baked& baked) {
+    if (!rigged.modes.empty()) {
+        auto morphing = add_modes(baked.tree.view(), rigged.mesh.view(), rigged.morphs());
+        if (!morphing) return failure_of(a.mesh, morphing.error());
+        baked.tree = std::move(*morphing);
+    }
+    if (!rigged.bones.empty()) {
+        auto skinned = add_skin(baked.tree.view(), rigged.mesh.view(), rigged.skin());
+        if (!skinned) return failure_of(a.mesh, skinned.error());
+        baked.tree = std::move(*skinned);
+    }
+    return kSuccess;
+}
+
 // Gives the tree its modes, if there are any. The cache holds trees without: it knows no modes.
 Outcome<> deform(const Asset& a, Baked& baked) {
-    if (a.modes.empty()) return kSuccess;
+    if (a.modes.empty() && !a.skin) return kSuccess;
     const auto import = import_options(a.mesh_options);
     if (!import) return import.error();
+    if (a.skin) {
+        const auto rigged = read_rigged(a, *import);
+        return rigged ? rig(a, *rigged, baked) : Outcome<>(rigged.error());
+    }
     const auto mesh = read_mesh(a.mesh, *import);
     if (!mesh) return mesh.error();
     const auto modes = read_modes(a.modes, a.ranges, mesh->placement.scale);
@@ -138,6 +180,8 @@ void declare_asset_options(CLI::App& app, Asset& a) {
         "also an inner cover: at most so many ellipsoids, 1 ... 65536, inside the solid; the mesh must be closed");
     app.add_option("--modes", a.modes,
                    "how the mesh deforms, .npz or .npy of shape (modes, vertices, 3): the nodes hold it as it moves");
+    app.add_flag("--skin", a.skin,
+                 "of glTF and GLB: bones and morph targets move the body, and the nodes hold it as they do");
     app.add_option("--range", a.ranges,
                    "largest coordinate of all modes, or of each; in the place of the file's \"ranges\"")
         ->delimiter(',')

@@ -30,6 +30,7 @@ struct Asset {
     std::string clearance, fill, keep_holes; ///< lengths with their units
     std::string modes;                       ///< a file
     std::vector<float> ranges;
+    bool skin = false;
     MeshOptions mesh_options;
     BuildOptions options;
 };

@@ -3,6 +3,7 @@
 #include "builder/polygons.hpp"
 
 #include <prolate/mesh.hpp>
+#include <prolate/rig.hpp>
 
 #include <assimp/Exporter.hpp>
 #include <assimp/Importer.hpp>
@@ -732,6 +733,73 @@ TEST_F(Import, InstancesSparseStripsAndFansOfGltf) {
         load(path, {}, report);
         EXPECT_EQ(report.notes.size(), 2u) << "y is up; lines are left out";
     }
+}
+
+// A tetrahedron of two joints and two morph targets. Its node's transform does not count, as glTF says.
+std::string rigged_tetrahedron(const std::vector<float>& weights, const std::string& more_nodes = "",
+                               const std::string& scene = "0") {
+    Gltf g;
+    const std::vector<float> points = {0, 0, 0, 1.5f, 0, 0, 0, 1.25f, 0, 0, 0, 1};
+    const size_t p = g.accessor(g.view(points), 5126, 4, "VEC3"),
+                 c = g.accessor(g.view(kTetrahedron), 5123, 12, "SCALAR");
+    const size_t j = g.accessor(g.view(std::vector<uint8_t>{0, 9, 9, 9, 1, 0, 9, 9, 0, 1, 9, 9, 1, 9, 9, 9}), 5121, 4,
+                                "VEC4"),
+                 w = g.accessor(g.view(weights), 5126, 4, "VEC4");
+    const size_t up = g.accessor(g.view(std::vector<float>{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f}), 5126, 4, "VEC3"),
+                 in = g.accessor(g.view(std::vector<float>{0, 0, 0, -1, 0, 0, 0, 0, 0, 0, 0, 0}), 5126, 4, "VEC3");
+    std::vector<float> bind(32);
+    for (size_t i = 0; i < 4; ++i) bind[5 * i] = bind[16 + 5 * i] = 1;
+    const size_t m = g.accessor(g.view(bind), 5126, 2, "MAT4");
+    const auto n = [](size_t x) { return std::to_string(x); };
+    return g.file(
+        R"({"attributes":{"POSITION":)" + n(p) + R"(,"JOINTS_0":)" + n(j) + R"(,"WEIGHTS_0":)" + n(w) +
+            R"(},"indices":)" + n(c) + R"(,"targets":[{"POSITION":)" + n(up) + R"(},{"POSITION":)" + n(in) + R"(}]})",
+        R"([{"mesh":0,"skin":0,"weights":[0,-2],"translation":[5,0,0]},{"name":"hip","children":[2]},{"name":"knee"})" +
+            more_nodes + "]",
+        R"(,"scene":0,"scenes":[{"nodes":[)" + scene + R"(]}],"skins":[{"joints":[1,2],"inverseBindMatrices":)" + n(m) +
+            "}]");
+}
+
+TEST_F(Import, SkinsAndMorphTargetsOfGltf) {
+    const std::vector<float> weights = {1, 0, 0, 0, 0.75f, 0.25f, 0, 0, 0.5f, 0.5f, 0, 0, 1, 0, 0, 0};
+    const std::string path = write("rig.gltf", rigged_tetrahedron(weights));
+    expect_tetrahedron(path);
+    const auto rigged = load_rigged_mesh(path.c_str(), {.unit = 2, .scale = {1, 1, -1}});
+    ASSERT_TRUE(rigged) << rigged.error().what;
+    EXPECT_EQ(rigged->bones, (std::vector<std::string>{"hip", "knee"}));
+    EXPECT_EQ(rigged->weights_each, 4u);
+    EXPECT_EQ(rigged->weights, weights);
+    EXPECT_EQ(rigged->indices, (std::vector<uint16_t>{0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0}));
+    EXPECT_EQ(rigged->modes.size(), 2u);
+    EXPECT_EQ(rigged->ranges, (std::vector<float>{1, 2}));
+    std::vector<float> moved(24);
+    moved[11] = -1, moved[15] = -2; // as the mesh is scaled
+    EXPECT_EQ(rigged->displacements, moved);
+    const auto mesh = load_mesh(path.c_str(), {.unit = 2, .scale = {1, 1, -1}});
+    EXPECT_EQ(rigged->mesh.vertices, mesh->vertices);
+    EXPECT_EQ(rigged->mesh.triangles, mesh->triangles);
+
+    const auto refused = [this](const std::string& text, const char* words, const char* name = "bad.gltf") {
+        ImportReport report;
+        const auto bad = load_rigged_mesh(write(name, text).c_str(), {}, &report);
+        ASSERT_FALSE(bad) << words;
+        EXPECT_NE((bad.error().what + (" " + report.detail)).find(words), std::string::npos)
+            << bad.error().what << " / " << report.detail;
+    };
+    const std::string good = rigged_tetrahedron(weights);
+    const auto with = [&good](const std::string& old, const std::string& text) {
+        std::string out = good;
+        return out.replace(out.find(old), old.size(), text);
+    };
+    refused(kOff, "only glTF", "a.off");
+    refused(with(R"("joints":[1,2])", R"("joints":[1])"), "a joint that the skin does not have");
+    refused(with(R"("joints":[1,2])", R"("joints":[])"), "without joints");
+    refused(with(R"("joints":[1,2])", R"("joints":[1,2,2])"), "fewer matrices than joints");
+    refused(with(R"("joints":[1,2])", R"("joints":[1,7])"), "does not exist skins[0].joints[1]");
+    refused(with(R"(,"JOINTS_0")", R"(,"OTHERS_0")"), "without joints");
+    refused(with(R"(,"skin":0,"weights":[0,-2])", R"(,"skin":0,"weights":[0])"), "wrong length nodes[0].weights");
+    refused(rigged_tetrahedron(weights, R"(,{"mesh":0})", "0,3"), "beside skinned ones");
+    refused(quantised<int8_t>(100, 5120, false), "neither skins nor morph targets");
 }
 
 TEST_F(Import, GltfExtensionsThatAreNotReadAreNamed) {

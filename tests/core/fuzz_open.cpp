@@ -112,13 +112,18 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     uint32_t modes = 0;
     if (const auto deformation = tree.deformation())
         for (; modes < deformation->mode_count(); ++modes) q[modes] = deformation->range(modes);
+    BoneMatrix bones[kMaxBones];
+    const uint32_t bone_count = tree.skin() ? tree.skin()->bone_count() : 0;
+    for (uint32_t b = 0; b < bone_count; ++b) // each moved by another length
+        bones[b].m[b % 3][3] = reach * static_cast<float>(b),
+                       bones[b].m[0][1] = static_cast<float>(data[b % size]) / 64;
     const auto ask = [&](const Pose& a, const Pose& b) {
         const Solid solid(tree, options.max_level);
         const SolidsOptions limits{.max_pair_tests = options.max_pair_tests};
         require(collide(solid, a, solid, b, context, limits).stats.tests() <= limits.max_pair_tests);
         ContactManifolds of_solids;
         require(contacts(solid, a, solid, b, of_solids, context, limits).stats.tests() <= limits.max_pair_tests);
-        const DeformedBody moved{tree, a, {q, modes}};
+        const DeformedBody moved{tree, a, {q, modes}, {bones, bone_count}};
         require(collide(moved, {tree, b}, context, options).stats.tests() <= options.max_pair_tests);
         const DeformedDistanceResult d = distance(
             moved, {tree, b}, context, {.max_level = options.max_level, .max_pair_tests = options.max_pair_tests});

@@ -85,7 +85,7 @@ elseif(HOW STREQUAL "query_only")
   run(0 "opened no header of the builder's libraries" ${CMAKE_COMMAND} -D BUILD=${WORK}/query_only-library
     -P ${CMAKE_CURRENT_LIST_DIR}/opened_headers.cmake)
   run(0 "" ${CMAKE_COMMAND} --install ${WORK}/query_only-library --prefix ${prefix})
-  expect_headers(${prefix}/include/prolate build.hpp mesh.hpp modes.hpp verify.hpp)
+  expect_headers(${prefix}/include/prolate build.hpp mesh.hpp modes.hpp rig.hpp verify.hpp)
   configure_and_build(${consumer} ${programs} -D CMAKE_PREFIX_PATH=${prefix} -D USE_BUILDER=OFF
     -D INSTALLED_HEADERS=${prefix}/include/prolate ${without_builder_libraries})
   # A runtime-only package must say so when asked for the builder.
