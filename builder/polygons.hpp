@@ -91,7 +91,7 @@ Result<Polygons> read_3mf(std::string_view bytes, std::string& detail);
 /// `type` is the name's extension in lower case, with the dot; other files are sought beside `path`.
 /// With `rig`, all of that but its mesh is read, too.
 Result<Polygons> read_gltf(std::string_view type, std::string_view bytes, const std::string& path, ImportReport& report,
-                           RiggedMesh* rig);
+                           RiggedMesh* rig = nullptr);
 /// The JSON of a glTF or GLB file; empty if there is none.
 std::string_view gltf_json(std::string_view type, std::string_view bytes);
 /// The path that a glTF's URI names: without %20 and the like.

@@ -73,10 +73,14 @@ prolate_raycast_result result_of(const RaycastResult& r) {
 }
 
 bool has_coordinates(const prolate_deformed_body& body) {
-    return body.q != nullptr || body.q_count == 0;
+    return (body.q != nullptr || body.q_count == 0) && (body.bones != nullptr || body.bone_count == 0);
 }
+static_assert(sizeof(BoneMatrix) == 12 * sizeof(float));
 DeformedBody deformed(const TreeView& tree, const prolate_deformed_body& body) {
-    return {tree, same<Pose>(body.body.pose), {body.q, body.q_count}};
+    return {tree,
+            same<Pose>(body.body.pose),
+            {body.q, body.q_count},
+            {reinterpret_cast<const BoneMatrix*>(body.bones), body.bone_count}};
 }
 void write_reason(Undecided reason, prolate_undecided* to) {
     if (to != nullptr) *to = static_cast<prolate_undecided>(reason);
@@ -196,6 +200,12 @@ uint32_t prolate_mode_count(const prolate_tree* tree) {
 
 float prolate_mode_range(const prolate_tree* tree, uint32_t mode) {
     return mode < prolate_mode_count(tree) ? view_of(tree)->deformation()->range(mode) : 0;
+}
+
+uint32_t prolate_bone_count(const prolate_tree* tree) {
+    const TreeView* const view = view_of(tree);
+    const auto skin = view != nullptr ? view->skin() : std::nullopt;
+    return skin ? skin->bone_count() : 0;
 }
 
 prolate_status prolate_collide_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,

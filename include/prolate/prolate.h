@@ -255,17 +255,20 @@ PROLATE_API prolate_status prolate_distance_solids(prolate_body a, prolate_body 
                                                    const prolate_distance_options* options,
                                                    prolate_solids_distance* result);
 
-/** deform.hpp: DeformedBody. `q` may be null where `q_count` is 0: all coordinates are 0. */
+/** deform.hpp: DeformedBody. `q` may be null where `q_count` is 0: all coordinates are 0. `bones`: 12 floats for each, a
+ * matrix of 3 by 4, row by row; may be null where `bone_count` is 0: all are the identity. */
 typedef struct prolate_deformed_body {
     prolate_body body;
     const float* q;
     uint32_t q_count;
+    const float* bones;
+    uint32_t bone_count;
 } prolate_deformed_body;
 /** deform.hpp: Undecided, why a query of deformed bodies decided nothing. */
 typedef uint8_t prolate_undecided;
 enum {
     PROLATE_DECIDED = 0,
-    PROLATE_UNDECIDED_COORDINATES = 1, /**< another number than the tree has modes, out of range, or NaN */
+    PROLATE_UNDECIDED_COORDINATES = 1, /**< another number than the tree has modes, or bones; out of range, or NaN */
     PROLATE_UNDECIDED_INPUT = 2,       /**< a pose or a ray that is not finite */
     PROLATE_UNDECIDED_BUDGET = 3
 };
@@ -273,6 +276,8 @@ enum {
 PROLATE_API uint32_t prolate_mode_count(const prolate_tree* tree);
 /** Largest absolute value of coordinate `mode`; 0 if there is no such mode. */
 PROLATE_API float prolate_mode_range(const prolate_tree* tree, uint32_t mode);
+/** Bones of the tree's skin; 0 if it has none, or `tree` was not opened. */
+PROLATE_API uint32_t prolate_bone_count(const prolate_tree* tree);
 /** deform.hpp: collide() and distance(). `reason` may be NULL. */
 PROLATE_API prolate_status prolate_collide_deformed(prolate_deformed_body a, prolate_deformed_body b, void* scratch,
                                                     size_t scratch_size, const prolate_query_options* options,

@@ -136,8 +136,9 @@ static void test_deformed(void) { /* fuzz_capi asks about trees that have modes 
     prolate_raycast_result r = PROLATE_INIT(prolate_raycast_result);
     prolate_undecided reason = PROLATE_UNDECIDED_INPUT;
     const prolate_ray ray = {{-5, 0, 0}, {1, 0, 0}, 10};
-    prolate_deformed_body still = {at(&box, 0, 0, 0), NULL, 0}, near_by = {at(&box, 0.5f, 0, 0), NULL, 0},
-                          far_off = {at(&box, 3, 0, 0), NULL, 0};
+    prolate_deformed_body still = {at(&box, 0, 0, 0), NULL, 0, NULL, 0},
+                          near_by = {at(&box, 0.5f, 0, 0), NULL, 0, NULL, 0},
+                          far_off = {at(&box, 3, 0, 0), NULL, 0, NULL, 0};
     CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason));
     CHECK(c.verdict == PROLATE_SEPARATED && reason == PROLATE_DECIDED);
     CHECK_OK(prolate_collide_deformed(still, near_by, scratch, scratch_size, NULL, &c, NULL));
@@ -171,6 +172,13 @@ static void test_deformed(void) { /* fuzz_capi asks about trees that have modes 
                  PROLATE_BAD_ARGUMENT);
     CHECK_STATUS(prolate_raycast_deformed(still, ray, scratch, scratch_size, NULL, &r, &reason), PROLATE_BAD_ARGUMENT);
     CHECK(prolate_mode_count(&box) == 0 && prolate_mode_range(&box, 0) == 0 && prolate_mode_count(NULL) == 0);
+    const float bones[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    still.q_count = 0, still.bones = bones, still.bone_count = 1; /* nor has it bones */
+    CHECK_OK(prolate_collide_deformed(still, far_off, scratch, scratch_size, NULL, &c, &reason));
+    CHECK(c.verdict == PROLATE_UNDECIDED && reason == PROLATE_UNDECIDED_COORDINATES);
+    still.bones = NULL;
+    CHECK_STATUS(prolate_raycast_deformed(still, ray, scratch, scratch_size, NULL, &r, &reason), PROLATE_BAD_ARGUMENT);
+    CHECK(prolate_bone_count(&box) == 0 && prolate_bone_count(NULL) == 0);
 }
 
 static void test_solids(void) {

@@ -122,7 +122,7 @@ void query(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scr
     require(s.time_lower <= s.time_upper || s.verdict == PROLATE_SEPARATED);
 }
 
-// Coordinates within the ranges of a tree's modes, and not.
+// Coordinates within the ranges of a tree's modes, and not; matrices of its bones that are finite, and not.
 void query_deformed(Input& in, const prolate_body& a, const prolate_body& b, Scratch& scratch) {
     void* const memory = scratch.bytes;
     const size_t room = sizeof scratch.bytes;
@@ -134,7 +134,14 @@ void query_deformed(Input& in, const prolate_body& a, const prolate_body& b, Scr
         q[m] = prolate_mode_range(b.tree, m) * in.number();
         in_range = in_range && std::fabs(q[m]) <= prolate_mode_range(b.tree, m);
     }
-    const prolate_deformed_body still{a, nullptr, 0}, moved{b, q, modes};
+    static float bones[12 * 1024];
+    const uint32_t bone_count = prolate_bone_count(b.tree);
+    require(bone_count <= 1024);
+    for (uint32_t i = 0; i < 12 * bone_count; ++i) {
+        bones[i] = in.number();
+        in_range = in_range && std::fabs(bones[i]) <= (i % 4 < 3 ? 1024 : 0x1p74f);
+    }
+    const prolate_deformed_body still{a, nullptr, 0, nullptr, 0}, moved{b, q, modes, bones, bone_count};
     const bool finite = is_finite(a.pose) && is_finite(b.pose);
     auto options = fresh<prolate_query_options>();
     options.max_tests = in.take<uint16_t>(), options.max_level = in.take<uint8_t>() % 4, options.margin = in.number();
