@@ -42,6 +42,11 @@ std::span<const BodyPair> pairs_of(const prolate_body_pair* pairs, size_t count)
     return {reinterpret_cast<const BodyPair*>(pairs), count};
 }
 
+// Do all bodies that pairs name exist?
+bool all_exist(const World& world, std::span<const BodyPair> pairs) {
+    return std::ranges::all_of(pairs, [&](const BodyPair& p) { return world.find(p.a) && world.find(p.b); });
+}
+
 // Answers of some questions at a time, in room of our own: ask(first, count, span) fills the span.
 constexpr size_t kAtOnce = 64;
 template <class Answer, class Ask, class Take> prolate_status by_parts(size_t count, Ask&& ask, Take&& take) {
@@ -95,15 +100,30 @@ prolate_status prolate_world_collide(const prolate_world* world, const prolate_b
                              options_of(call.given)));
 }
 
+prolate_status prolate_world_collide_solids(const prolate_world* world, const prolate_body_pair* pairs, size_t count,
+                                            const prolate_workers* workers, const prolate_query_options* options,
+                                            prolate_verdict* verdicts) {
+    const WorldCall call(world, workers, options);
+    if (call.status != PROLATE_OK) return call.status;
+    if (!sound(pairs, count, verdicts)) return PROLATE_BAD_ARGUMENT;
+    if (!all_exist(*world->world, pairs_of(pairs, count))) return PROLATE_BAD_ID;
+    const QueryOptions limits = options_of(call.given);
+    return by_parts<SolidsResult>(
+        count,
+        [&](size_t first, size_t now, std::span<SolidsResult> out) {
+            return collide(*world->world, pairs_of(pairs + first, now), out, call.workers,
+                           SolidsOptions{.max_pair_tests = limits.max_pair_tests, .margin = limits.margin});
+        },
+        [&](size_t i, const SolidsResult& r) { verdicts[i] = verdict_of(r.verdict); });
+}
+
 prolate_status prolate_world_distance(const prolate_world* world, const prolate_body_pair* pairs, size_t count,
                                       const prolate_workers* workers, const prolate_distance_options* options,
                                       prolate_distance_answer* answers) {
     const WorldCall call(world, workers, options);
     if (call.status != PROLATE_OK) return call.status;
     if (!sound(pairs, count, answers)) return PROLATE_BAD_ARGUMENT;
-    for (size_t i = 0; i < count; ++i)
-        for (const prolate_body_id id : {pairs[i].a, pairs[i].b})
-            if (world->world->find(same<BodyId>(id)) == nullptr) return PROLATE_BAD_ID;
+    if (!all_exist(*world->world, pairs_of(pairs, count))) return PROLATE_BAD_ID;
     return by_parts<DistanceResult>(
         count,
         [&](size_t first, size_t now, std::span<DistanceResult> out) {

@@ -565,6 +565,11 @@ typedef struct prolate_workers {
 PROLATE_API prolate_status prolate_world_collide(const prolate_world* world, const prolate_body_pair* pairs,
                                                  size_t count, const prolate_workers* workers,
                                                  const prolate_query_options* options, prolate_verdict* verdicts);
+/** The same of the solids (solids.hpp): certain both ways. `max_level` of the options is not used. */
+PROLATE_API prolate_status prolate_world_collide_solids(const prolate_world* world, const prolate_body_pair* pairs,
+                                                        size_t count, const prolate_workers* workers,
+                                                        const prolate_query_options* options,
+                                                        prolate_verdict* verdicts);
 /** world_queries.hpp: distance(). */
 typedef struct prolate_distance_answer {
     double lower, upper;

@@ -203,6 +203,13 @@ class World:
         """
         return WorldVerdicts(*self._world.collide(margin, max_level, budget, threads))
 
+    def collide_solids(self, *, margin: float = 0, budget: int | None = None, threads: int = 1) -> WorldVerdicts:
+        """All pairs whose boxes overlap, and whether their *solids* come within ``margin`` (metres), certain both ways.
+
+        Parameters are those of :func:`prolate.collide_solids`.
+        """
+        return WorldVerdicts(*self._world.collide_solids(margin, budget, threads))
+
     def distance(
         self,
         *,

@@ -137,6 +137,7 @@ void bind_world(nb::module_& m) {
         .def("__len__", &HeldWorld::count)
         .def("pairs", &HeldWorld::pairs)
         .def("collide", &HeldWorld::collide, any("margin"), any("max_level"), any("budget"), any("threads"))
+        .def("collide_solids", &HeldWorld::collide_solids, any("margin"), any("budget"), any("threads"))
         .def("distance", &HeldWorld::distance, any("tolerance"), any("max_distance"), any("budget"), any("threads"))
         .def("contacts", &HeldWorld::contacts, any("margin"), any("budget"), any("threads"))
         .def("raycast", &HeldWorld::raycast, any("origins"), any("directions"), any("radius"), any("max_t"),

@@ -34,7 +34,8 @@ public:
 
     nb::tuple pairs(); ///< (ids, begins)
     nb::tuple collide(nb::handle margin, nb::handle max_level, nb::handle budget,
-                      nb::handle threads); ///< (ids, verdicts)
+                      nb::handle threads);                                              ///< (ids, verdicts)
+    nb::tuple collide_solids(nb::handle margin, nb::handle budget, nb::handle threads); ///< (ids, verdicts)
     /// (ids, arrays of PairArrays)
     nb::tuple distance(nb::handle tolerance, nb::handle max_distance, nb::handle budget, nb::handle threads);
     /// (ids, contact_arrays(), verdicts, ids of events, kinds of events)

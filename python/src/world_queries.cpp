@@ -41,6 +41,19 @@ nb::tuple HeldWorld::collide(nb::handle margin, nb::handle max_level, nb::handle
     return nb::make_tuple(ids, to_numpy(std::move(verdicts), {found.size()}));
 }
 
+nb::tuple HeldWorld::collide_solids(nb::handle margin, nb::handle budget, nb::handle threads) {
+    const Limits limits(margin, nb::none(), budget);
+    std::vector<SolidsResult> found;
+    const nb::object ids = ask_pairs(threads, [&](const Workers& workers, std::span<const BodyPair> pairs) {
+        found.resize(pairs.size());
+        const SolidsOptions options{.max_pair_tests = limits.budget, .margin = rounded_up(limits.margin)};
+        return prolate::collide(world_, pairs, std::span(found), workers, options);
+    });
+    auto verdicts = new_array<uint8_t>(found.size());
+    for (size_t i = 0; i < found.size(); ++i) verdicts[i] = static_cast<uint8_t>(found[i].verdict);
+    return nb::make_tuple(ids, to_numpy(std::move(verdicts), {found.size()}));
+}
+
 nb::tuple HeldWorld::distance(nb::handle tolerance, nb::handle max_distance, nb::handle budget, nb::handle threads) {
     DistanceOptions options;
     options.tolerance_relative = number_from_0(tolerance, "tolerance");

@@ -103,6 +103,23 @@ def test_depths_and_ways_out(bodies, offset):
     assert 0 < one.lower < one.upper and one.way_out.shape == (3,)
 
 
+def test_pairs_of_a_world(bodies):
+    covers, exact = prolate.World(), prolate.World()
+    floor = prolate.HalfSpace((0, 0, 1), -0.6)
+    at = poses(np.random.default_rng(9), 30, 1.0)
+    for world, i in ((covers, 0), (exact, 1)):
+        world.insert(floor)
+        for k, pose in enumerate(at):
+            world.insert(bodies[k % 2][i], pose)
+    ids, found = covers.collide_solids()
+    wanted = {tuple(row): verdict for row, verdict in zip(*(x.tolist() for x in exact.collide()))}
+    for row, verdict in zip(ids.tolist(), found.tolist()):
+        assert verdict in (Verdict.UNDECIDED, wanted.get(tuple(row), Verdict.SEPARATED))
+    assert (found != Verdict.UNDECIDED).mean() > 0.6
+    assert (covers.collide_solids(threads=2).verdict == found).all()
+    assert (covers.collide_solids(budget=0).verdict == Verdict.UNDECIDED).all()
+
+
 def test_single_poses_and_wrong_arguments(bodies):
     tree = bodies[0][0]
     assert prolate.collide_solids(tree, IDENTITY, tree, IDENTITY) is Verdict.OVERLAPPING

@@ -424,6 +424,10 @@ static void test_worlds(void) {
     for (size_t i = 0; i < count; ++i) meeting += verdicts[i] == PROLATE_OVERLAPPING;
     CHECK(meeting == 11 && runs > 0);
     CHECK_OK(prolate_world_collide(world, pairs, count, &one, NULL, verdicts));
+    prolate_verdict* const certain = malloc(count + 1);
+    CHECK_OK(prolate_world_collide_solids(world, pairs, count, &two, NULL, certain));
+    for (size_t i = 0; i < count; ++i) CHECK(certain[i] == verdicts[i] || certain[i] == PROLATE_UNDECIDED);
+    free(certain);
     free(verdicts);
     prolate_distance_answer* const distances = calloc(count, sizeof *distances);
     CHECK_OK(prolate_world_distance(world, pairs, count, &two, NULL, distances));
@@ -435,6 +439,7 @@ static void test_worlds(void) {
     CHECK_STATUS(prolate_world_move(world, ids[4], (prolate_pose){{50, 0, 0}, upright}), PROLATE_BAD_ID);
     prolate_verdict unused[64];
     CHECK_STATUS(prolate_world_collide(world, pairs, count, &one, NULL, unused), PROLATE_BAD_ID);
+    CHECK_STATUS(prolate_world_collide_solids(world, pairs, count, &one, NULL, unused), PROLATE_BAD_ID);
     CHECK_OK(prolate_world_update_pairs(world, NULL, &pairs, &count));
     CHECK_STATUS(prolate_world_insert(world, NULL, &ids[0]), PROLATE_BAD_ARGUMENT);
     body.version = 9;
