@@ -90,7 +90,7 @@ struct SolidsDistance {
 
 /// How far apart are the solids? The lower bound is that of the outer covers, the upper one that of the inner covers.
 /// If the solids are certainly at least options.max_distance apart, `upper` is not looked for. options.max_level is not
-/// used. Anytime, as distance() of trees is.
+/// used. Anytime, as distance() of trees is: the lower bound gets half of the budget, the upper one what is left.
 SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,
                         const DistanceOptions& options = {}) noexcept;
 

@@ -160,9 +160,9 @@ SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, cons
     query::SolidPair pair(a, pose_a, b, pose_b, context, options.max_pair_tests);
     if (!pair.may_be_asked()) return {};
     SolidsDistance out;
-    const auto ask = [&](const TreeView& x, const TreeView& y) {
+    const auto ask = [&](const TreeView& x, const TreeView& y, uint64_t budget) {
         DistanceOptions limits = options;
-        limits.max_level = kMaxLevels, limits.max_pair_tests = pair.left();
+        limits.max_level = kMaxLevels, limits.max_pair_tests = budget;
         const DistanceResult found = distance(x, pose_a, y, pose_b, context, limits);
         query::add(found.stats, pair.stats);
         out.stats = pair.stats;
@@ -171,7 +171,9 @@ SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, cons
     const auto take_upper = [&](const DistanceResult& found) {
         out.upper = found.upper, out.point_a = found.point_a, out.point_b = found.point_b;
     };
-    const DistanceResult outer = ask(a.outer(), b.outer());
+    // Half of the budget for either bound, at least: a small one gives both.
+    const bool both = !pair.are_triangles() && pair.have_inner();
+    const DistanceResult outer = ask(a.outer(), b.outer(), both ? pair.left() / 2 : pair.left());
     out.lower = outer.lower;
     if (pair.are_triangles()) {
         out.verdict = outer.verdict;
@@ -179,8 +181,8 @@ SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, cons
         return out;
     }
     if (outer.verdict == Verdict::separated) out.verdict = Verdict::separated;
-    if (out.lower >= query::sound_length(options.max_distance) || !pair.have_inner()) return out;
-    const DistanceResult inner = ask(*a.inner(), *b.inner());
+    if (out.lower >= query::sound_length(options.max_distance) || !both) return out;
+    const DistanceResult inner = ask(*a.inner(), *b.inner(), pair.left());
     take_upper(inner);
     if (out.lower == 0 && inner.verdict == Verdict::overlapping && pair.certainly_meet(inner.pair, inner.enclosed))
         out.verdict = Verdict::overlapping, out.upper = 0;

@@ -1,6 +1,7 @@
 // Determinism: the same input gives the same bits on every instruction set and from every compiler. Each kind of query
 // has a known hash of all that it answered in a few hundred scenes. A change that means to alter answers (another order
 // of the descent, say, which names another pair) puts the new number here; no other change may.
+#include "src/format.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/scenes.hpp"
 #include "tests/shapes.hpp"
@@ -15,6 +16,7 @@
 #include <prolate/points.hpp>
 #include <prolate/raycast.hpp>
 #include <prolate/shapes.hpp>
+#include <prolate/solids.hpp>
 #include <prolate/sweep.hpp>
 
 #include <gtest/gtest.h>
@@ -182,6 +184,46 @@ TEST(Bits, Contacts) {
             }
         }
     });
+}
+
+// The nodes of a tree's level 1, at half their size, below the first: an inner cover as far as the format knows.
+std::vector<std::byte> with_inner(std::vector<std::byte> bytes) {
+    const TreeView tree = *TreeView::open(bytes);
+    const Ellipsoid& root = tree.root_bound();
+    const double low[] = {root.center.x - 3.0, root.center.y - 3.0, root.center.z - 3.0},
+                 high[] = {root.center.x + 3.0, root.center.y + 3.0, root.center.z + 3.0};
+    const format::Lattice lattice = format::lattice_for(low, high);
+    std::vector<format::PackedLevel> levels(2);
+    tree.for_each_node(1, [&](uint32_t node) {
+        const Ellipsoid e = tree.ellipsoid(node);
+        const double center[] = {e.center.x, e.center.y, e.center.z};
+        const double factor[] = {0.5 * e.l11, 0.5 * e.l21, 0.5 * e.l22, 0.5 * e.l31, 0.5 * e.l32, 0.5 * e.l33};
+        format::quantise(levels[1].nodes.emplace_back(), lattice, center, factor);
+    });
+    levels[0].nodes.push_back(levels[1].nodes[0]);
+    levels[0].nodes[0].child_count = static_cast<uint8_t>(levels[1].nodes.size());
+    BakeInfo info = tree.bake_info();
+    info.inner = true;
+    format::append_section(bytes, {'I', 'N', 'N', 'R'}, format::encode(info, 12, lattice, levels));
+    return bytes;
+}
+
+TEST(Bits, Solids) {
+    std::vector<std::vector<std::byte>> bytes;
+    for (size_t i = 0; i < 2; ++i) bytes.push_back(with_inner(all_scenes().bytes[i]));
+    const Solid a(*TreeView::open(bytes[0])), b(*TreeView::open(bytes[1]));
+    ASSERT_TRUE(a.inner() && b.inner());
+    uint32_t counts[3] = {};
+    expect_bits(18219577457279477485u, [&](Bits& bits, const Scenes::Pair& p) {
+        const SolidsResult r = collide(a, p.pose_a, b, p.pose_b, context(), {.margin = 0.01f});
+        const SolidsDistance d = distance(a, p.pose_a, b, p.pose_b, context());
+        ContactManifolds manifolds;
+        const SolidsContacts c = contacts(a, p.pose_a, b, p.pose_b, manifolds, context());
+        bits.add_all(r.verdict, r.out_of_budget, r.stats, d.verdict, d.lower, d.upper, d.point_a, d.point_b, d.stats);
+        bits.add_all(c.verdict, c.depth_lower, c.depth_upper, c.way_out, c.found, c.stats, manifolds.count);
+        ++counts[static_cast<int>(r.verdict)];
+    });
+    for (const uint32_t count : counts) EXPECT_GT(count, 10u);
 }
 
 TEST(Bits, Sweep) {

@@ -203,10 +203,12 @@ TEST_F(Solids, PrefixesOfExactTreesAreNoSolids) {
 TEST_F(Solids, BudgetsAndBadPosesClaimNothingWrong) {
     Random random(4);
     const Solid x(torus().covers.view()), y(crossed().covers.view());
+    int with_both = 0;
     for (int i = 0; i < 300; ++i) {
         const Pose a{{}, random.rotation()}, b = near_pose(random);
         const SolidsResult whole = collide(x, a, y, b, context());
-        for (const uint64_t budget : {0u, 1u, 20u, 60u, 200u}) {
+        SolidsDistance before;
+        for (const uint64_t budget : {0u, 1u, 20u, 60u, 200u, 1000u}) {
             const SolidsResult part = collide(x, a, y, b, context(), {.max_pair_tests = budget});
             EXPECT_LE(part.stats.tests(), budget);
             EXPECT_TRUE(part.verdict == whole.verdict || part.verdict == Verdict::undecided);
@@ -216,8 +218,14 @@ TEST_F(Solids, BudgetsAndBadPosesClaimNothingWrong) {
             const SolidsDistance d = distance(x, a, y, b, context(), {.max_pair_tests = budget});
             EXPECT_LE(d.stats.tests(), budget);
             EXPECT_LE(d.lower, d.upper);
+            EXPECT_GE(d.lower, before.lower); // more only narrows the bounds
+            EXPECT_LE(d.upper, before.upper);
+            EXPECT_TRUE(before.verdict == Verdict::undecided || d.verdict == before.verdict);
+            with_both += budget == 60 && d.upper < HUGE_VAL && (d.lower > 0 || d.upper == 0);
+            before = d;
         }
     }
+    EXPECT_GT(with_both, 100);
     const float nan = std::numeric_limits<float>::quiet_NaN();
     for (const Pose& bad : {Pose{{nan, 0, 0}, {}}, Pose{{}, {0, 0, 0, 0}}})
         for (const Solid& other : {y, Solid(crossed().exact.view())}) {
