@@ -52,9 +52,10 @@ double smaller_size(const CollideSearch& search) {
 
 class Collector {
 public:
-    Collector(CollideSearch& search, Scratch context, bool exchanged, const LastContacts& last, uint64_t many)
+    Collector(CollideSearch& search, const DividedScratch& scratch, bool exchanged, const LastContacts& last,
+              uint64_t many)
         : search_(search), exchanged_(exchanged), many_(many), last_(last), size_(smaller_size(search)),
-          pairs_(search, context, kSamePoint * size_), patches_(kSamePoint * size_),
+          pairs_(search, scratch, kSamePoint * size_), patches_(kSamePoint * size_),
           of_ellipsoids_(!search.a.tree.has_triangles() && !search.b.tree.has_triangles()) {
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
         search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
@@ -309,11 +310,12 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
         return {};
     }
     const auto bodies = in_canonical_order(a, pose_a, b, pose_b);
-    CollideSearch search(bodies, context, options);
+    const DividedScratch scratch = divide(context, a, b);
+    CollideSearch search(bodies, scratch.least, options);
     const RelativePose to_world = relative_pose(Pose{}, bodies.place_a);
     const LastContacts last(manifolds, bodies.exchanged, to_world);
     manifolds = {};
-    Collector collector(search, context, bodies.exchanged, last, many);
+    Collector collector(search, scratch, bodies.exchanged, last, many);
     MeetingPair met[kMany];
     search.all = true, search.pairs = met;
     ContactResult out;

@@ -69,10 +69,12 @@ uint64_t id_of(const Part& a, const Part& b) noexcept {
     return h;
 }
 
-PairContacts::PairContacts(CollideSearch& search, Scratch context, double same_point) noexcept
-    : s_(search), context_(context), same_point_(same_point), closed_a_(is_closed(search.a.tree)),
-      closed_b_(is_closed(search.b.tree)), hills_a_(search.a.tree, search.other_tests, search.options.max_pair_tests),
-      hills_b_(search.b.tree, search.other_tests, search.options.max_pair_tests) {}
+PairContacts::PairContacts(CollideSearch& search, const DividedScratch& scratch, double same_point) noexcept
+    : s_(search), context_(scratch.least), same_point_(same_point), closed_a_(is_closed(search.a.tree)),
+      closed_b_(is_closed(search.b.tree)), hills_a_(search.a.tree, search.other_tests, search.options.max_pair_tests,
+                                                    scratch.rest.first(scratch.rest.size() / 2)),
+      hills_b_(search.b.tree, search.other_tests, search.options.max_pair_tests,
+               scratch.rest.subspan(scratch.rest.size() / 2)) {}
 
 Surrounded PairContacts::surrounded_a(uint32_t triangle) const {
     return {.triangle = place(s_.a.tree, triangle),

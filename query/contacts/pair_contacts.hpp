@@ -5,6 +5,7 @@
 
 #include "query/collide/search.hpp"
 #include "query/contacts/manifold.hpp"
+#include "query/node/scratch.hpp"
 #include "query/triangle/contact.hpp"
 
 #include <glm/vec3.hpp>
@@ -48,9 +49,9 @@ using DeepestContacts = ContactList<4 * Patch::kSieve>;
 
 class PairContacts {
 public:
-    /// Points nearer to each other than `same_point`, metres, are one. Both arguments must outlive it; between two
-    /// traversals it uses the context's scratch.
-    PairContacts(CollideSearch& search, Scratch context, double same_point) noexcept;
+    /// Points nearer to each other than `same_point`, metres, are one. The search must outlive it. The search and,
+    /// between two traversals, the rays use the least scratch; the climbs the rest.
+    PairContacts(CollideSearch& search, const DividedScratch& scratch, double same_point) noexcept;
 
     /// The contacts along the normal that the pair has by itself; none, if it is not about as short a way out as the
     /// known one.

@@ -42,6 +42,14 @@ size_t scratch_size(const TreeView& a, const TreeView& b) noexcept {
     return bytes_for(most_siblings(a) + most_siblings(b));
 }
 
+query::DividedScratch query::divide(const Scratch& scratch, const TreeView& a, const TreeView& b) noexcept {
+    const std::span<std::byte> all(reinterpret_cast<std::byte*>(scratch.entries()),
+                                   size_t{scratch.count()} * sizeof(Scratch::Entry));
+    const size_t least = std::min(all.size(), size_t{entries_for(siblings_on_the_way(a) + siblings_on_the_way(b))} *
+                                                  sizeof(Scratch::Entry));
+    return {Scratch(all.first(least)), all.subspan(least)};
+}
+
 bool query::suffices(const Scratch& scratch, const TreeView& tree) noexcept {
     return scratch.count() == QueryContext::kEntries || scratch.count() >= entries_for(siblings_on_the_way(tree));
 }

@@ -4,7 +4,9 @@
 
 #include <prolate/query.hpp>
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace prolate::query {
 
@@ -18,6 +20,13 @@ inline uint32_t siblings_on_the_way(const TreeView& tree) noexcept {
 inline uint32_t heap_room(const Scratch& scratch, const TreeView& a, const TreeView& b) noexcept {
     return scratch.count() - kMaxDegree - siblings_on_the_way(a) - siblings_on_the_way(b);
 }
+
+/// A scratch that is large enough for two trees, as small as it may be, and what is left over.
+struct DividedScratch {
+    Scratch least;
+    std::span<std::byte> rest;
+};
+DividedScratch divide(const Scratch& scratch, const TreeView& a, const TreeView& b) noexcept;
 
 /// Is it large enough?
 bool suffices(const Scratch& scratch, const TreeView& tree) noexcept;

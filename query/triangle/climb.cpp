@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <new>
 
 namespace prolate::query {
 namespace {
@@ -26,26 +28,45 @@ public:
     // Bit i: the box of lane i may hold the point.
     uint32_t lanes(const std::byte* block) const {
         const BlockBoxes boxes(block);
-        uint32_t out = 0xff;
+        uint64_t held = kTops;
         for (size_t i = 0; i < 3; ++i) {
             const double per_step = boxes.per_step(i), x = at_[i] - boxes.origin(i);
             // Box steps, the whole ones below and above: rounding is far below the slack.
-            const int32_t below = static_cast<int32_t>(std::clamp((x + kSlack) * per_step, -1.0, 255.0) + 1) - 1,
-                          above = 256 - static_cast<int32_t>(256 - std::clamp((x - kSlack) * per_step, 0.0, 256.0));
-            uint32_t held = 0;
-            for (size_t lane = 0; lane < kBlockLanes; ++lane)
-                held |= static_cast<uint32_t>(boxes.low(i, lane) <= below && boxes.high(i, lane) >= above) << lane;
-            out &= held;
+            const double low = (x + kSlack) * per_step, high = (x - kSlack) * per_step;
+            if (!(low >= 0 && high <= 255)) return 0;
+            const auto below = static_cast<uint64_t>(std::min(low, 255.0)),
+                       above = 255 - static_cast<uint64_t>(255 - std::max(high, 0.0));
+            held &= no_less(kOnes * below, load_le<uint64_t>(block + kBlockBoxLow + kBlockLanes * i)) &
+                    no_less(load_le<uint64_t>(block + kBlockBoxHigh + kBlockLanes * i), kOnes * above);
         }
-        return out;
+        return static_cast<uint32_t>((held >> 7) * 0x0102040810204080 >> 56); // gathers one bit of each byte
     }
 
 private:
+    static constexpr uint64_t kOnes = 0x0101010101010101, kTops = 0x80 * kOnes;
+    // Eight bytes at once, in the top bit of each: x >= y.
+    static uint64_t no_less(uint64_t x, uint64_t y) {
+        const uint64_t difference = (x | kTops) - (y & ~kTops); // of the lower bits, which does not reach the next byte
+        return ((x & ~y) | (~(x ^ y) & difference)) & kTops;
+    }
+
     static constexpr double kSlack = 0x1p-10; // lattice steps
     double at_[3];
 };
 
 } // namespace
+
+// Null if there is too little of it.
+Hills::Known* Hills::many(std::span<std::byte> room) noexcept {
+    void* at = room.data();
+    size_t size = room.size();
+    return at == nullptr ? nullptr
+                         : static_cast<Known*>(std::align(alignof(Known), kManyKnown * sizeof(Known), at, size));
+}
+
+Hills::Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests, std::span<std::byte> room) noexcept
+    : tree_(tree), tests_(tests), most_tests_(most_tests), known_(many(room) != nullptr ? many(room) : few_),
+      known_count_(known_ == few_ ? kFewKnown : kManyKnown) {}
 
 // Calls visit(corners) for each triangle that has this vertex.
 template <class Visit> void Hills::find(uint32_t vertex, Visit&& visit) const {
@@ -88,7 +109,10 @@ uint32_t Hills::Known::place_of(uint32_t neighbour) const noexcept {
 
 // What is known of a vertex, found if it is not. Null if it has too many neighbours.
 const Hills::Known* Hills::known(uint32_t vertex) const {
-    Known& known = known_[vertex % kKnown];
+    if (!ready_)
+        for (uint32_t i = 0; i < known_count_; ++i) (new (known_ + i) Known)->vertex = UINT32_MAX;
+    ready_ = true;
+    Known& known = known_[vertex % known_count_];
     if (known.vertex == vertex) {
         tests_ += known.tests;
         return &known;

@@ -4,8 +4,9 @@
 // Neighbours are found by the vertices' indices: triangles hang together where they share a vertex. A vertex's
 // triangles lie in leaves whose boxes hold it, a few of them.
 //
-// Complexity: a step is a descent to the leaves around one vertex, about ten blocks; kClimbSteps at most. The last few
-// vertices' triangles and neighbours are kept: climbs of neighbouring pairs pass the same ones.
+// Complexity: a step is a descent to the leaves around one vertex, about ten blocks; kClimbSteps at most. The triangles
+// and neighbours of the last vertices are kept, of 128 if there is room, else of 12: climbs of neighbouring pairs pass
+// the same ones, and of ten steps nine find their vertex known.
 #pragma once
 
 #include "query/triangle/placed.hpp"
@@ -15,7 +16,9 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace prolate::query {
 
@@ -24,11 +27,11 @@ inline constexpr uint32_t kClimbSteps = 128;
 /// A tree with triangles, in its own frame.
 class Hills {
 public:
-    /// `tests` counts nodes and triangles looked at; nothing rises any more once they exceed `most_tests`.
-    Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests) noexcept
-        : tree_(tree), tests_(tests), most_tests_(most_tests) {
-        for (Known& known : known_) known.vertex = UINT32_MAX;
-    }
+    /// `tests` counts nodes and triangles looked at; nothing rises any more once they exceed `most_tests`. `room`:
+    /// memory to remember vertices in, of any size; it alters no answer and no count.
+    Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests, std::span<std::byte> room) noexcept;
+    Hills(const Hills&) = delete;
+    Hills& operator=(const Hills&) = delete;
 
     double height(uint32_t vertex, const glm::dvec3& up) const noexcept {
         return glm::dot(up, stored_vertex(tree_, vertex)) * double{tree_.scale()};
@@ -51,15 +54,19 @@ private:
 
         uint32_t place_of(uint32_t neighbour) const noexcept; // neighbour_count: nowhere
     };
-    static constexpr uint32_t kKnown = 12;
+    static constexpr uint32_t kFewKnown = 12, kManyKnown = 128;
 
     template <class Visit> void find(uint32_t vertex, Visit&& visit) const;
+    static Known* many(std::span<std::byte> room) noexcept;
     const Known* known(uint32_t vertex) const;
 
     const TreeView& tree_;
     uint64_t& tests_;
     const uint64_t most_tests_;
-    mutable Known known_[kKnown];
+    mutable Known few_[kFewKnown]; // without room
+    Known* const known_;
+    const uint32_t known_count_;
+    mutable bool ready_ = false; // most pairs of a scene never climb
 };
 
 /// A climb, a step at a time.
