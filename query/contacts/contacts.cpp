@@ -87,10 +87,13 @@ public:
 
     // The second pass, if the first one left out nothing and these are its pairs.
     void repeat(std::span<const MeetingPair> pairs) {
-        if (of_ellipsoids_)
-            for (size_t i = 0; i < pairs.size(); ++i) add_by_itself(waiting_.contacts[i]);
-        else
-            for (const MeetingPair& pair : pairs) add_points(pair);
+        for (size_t i = 0; i < pairs.size(); ++i)
+            if (of_ellipsoids_)
+                add_by_itself(waiting_.contacts[i]);
+            else if (pairs[i].triangle_a == kNoTriangle || pairs[i].triangle_b == kNoTriangle)
+                add_points(pairs[i]);
+            else if (!add_along_ways(pairs[i]))
+                add_own(pairs[i], own_[i]);
     }
 
     // After both: patches with points, at least one if any pair met.
@@ -119,6 +122,14 @@ private:
         const Patch* patch;
         Way way;
         Patch deepest;
+    };
+
+    // What two triangles have by themselves, if it is no longer than another patch's way: a normal of a face, or one
+    // point that waits.
+    struct Own {
+        dvec3 normal{0, 0, 0}; // 0: none
+        bool certain = false;
+        uint32_t waiting = 0;
     };
 
     // ---- what need not be looked at ----
@@ -192,6 +203,9 @@ private:
                 known = {p.normal(), p.overlap()};
         });
         const ContactsOfPair found = pairs_.by_itself(pair, known);
+        if (search_.found < kMany)
+            own_[search_.found] =
+                found.count == 0 ? Own{} : Own{found.contacts[0].normal, found.certain, waiting_.count};
         if (of_ellipsoids_ && search_.found < kWaiting) waiting_.contacts[search_.found] = found.contacts[0];
         for (const Contact& c : found) {
             if (found.certain) { // what is no better than what resolves it gives points, not a direction
@@ -219,7 +233,7 @@ private:
             });
             if (!resolved) take(c, true);
         }
-        waiting_.count = 0;
+        waiting_.count = 0; // they stay where they are
     }
 
     // ---- between the passes ----
@@ -252,13 +266,25 @@ private:
 
     void add_points(const MeetingPair& pair) {
         const bool has_triangle = pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle;
-        for (uint32_t i = 0; i < way_count_ && has_triangle; ++i) {
+        if (has_triangle && add_along_ways(pair)) return;
+        for (const Contact& c : pairs_.by_itself(pair)) add_by_itself(c);
+    }
+    // False if the pair may have others.
+    bool add_along_ways(const MeetingPair& pair) {
+        for (uint32_t i = 0; i < way_count_; ++i) {
             if (!pairs_.resolves(ways_[i].normal, ways_[i].depth, pair)) continue;
             const ContactsOfPair found = pairs_.along(ways_[i].normal, pair);
             for (const Contact& c : found) add_to(points_[i], ways_[i].normal, c);
-            if (found.certain) return;
+            if (found.certain) return true;
         }
-        for (const Contact& c : pairs_.by_itself(pair)) add_by_itself(c);
+        return false;
+    }
+    // What two triangles had in the first pass.
+    void add_own(const MeetingPair& pair, const Own& own) {
+        if (own.certain)
+            for (const Contact& c : pairs_.along(own.normal, pair)) add_by_itself(c);
+        else if (own.normal != dvec3(0))
+            add_by_itself(waiting_.contacts[own.waiting]);
     }
     void add_by_itself(const Contact& c) {
         Patch* const patch =
@@ -294,6 +320,7 @@ private:
     // Of edges, corners and closest points, in the first pass. Ellipsoids have none: then the contact of each pair, for
     // the second.
     ContactList<kWaiting> waiting_;
+    Own own_[kMany]; // of the first pass, for the second
     const bool of_ellipsoids_;
     uint32_t way_count_ = 0;
     Way ways_[kManifolds];
