@@ -100,10 +100,10 @@ struct SolidsContacts {
     Verdict verdict = Verdict::undecided;
     /// Certified: depth_lower <= depth of the solids <= depth_upper, metres. The depth is the length of the shortest
     /// translation after which the solids have no common inner point; 0 if they have none. `depth_upper` is infinite if
-    /// no way out was found.
+    /// the budget ended before a way out was found.
     double depth_lower = 0, depth_upper = std::numeric_limits<double>::infinity();
     /// Moving `b` by it, world, metres, certainly separates the solids, however the sum is rounded to floats;
-    /// `depth_upper` is its length. 0 if they are apart already, or if no way out was found.
+    /// `depth_upper` is its length. 0 if they are apart already, or if none was found.
     Vec3 way_out;
     uint64_t found = 0; ///< as ContactResult has it
     QueryStats stats;
@@ -111,8 +111,8 @@ struct SolidsContacts {
 
 /// Where and how deep do the solids touch? The manifolds are those of contacts() of the outer covers: a solver that
 /// resolves them separates the solids. The lower bound of the depth is that of the deepest pair of inner ellipsoids,
-/// about half of what these overlap by; the upper bound comes from moving the outer covers apart along the manifolds'
-/// normals.
+/// about half of what these overlap by. The upper bound comes from moving the outer covers apart along the manifolds'
+/// normals, or if none leads out, away from each other.
 SolidsContacts contacts(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b,
                         ContactManifolds& manifolds, Scratch context, const SolidsOptions& options = {}) noexcept;
 

@@ -360,6 +360,7 @@ TEST_F(Solids, DepthsOfTrianglesLieBetweenTheBounds) {
         ASSERT_EQ(manifolds.count, of_covers.count);
         ASSERT_LE(found.depth_lower, found.depth_upper) << i;
         EXPECT_EQ(found.depth_upper == 0, found.verdict == Verdict::separated);
+        EXPECT_LT(found.depth_upper, 10);
         if (found.depth_lower > 0) {
             ++deep;
             ASSERT_EQ(found.verdict, Verdict::overlapping) << i;
