@@ -402,6 +402,51 @@ TEST_F(Solids, DepthsOfTrianglesLieBetweenTheBounds) {
     EXPECT_EQ(manifolds.count, 0u);
 }
 
+// The same of scaled and rounded bodies, of poses that are uncertain, far from the origin, and with a margin, which
+// depths know nothing of.
+TEST_F(Solids, DepthsHoldForRoundedBodiesAndUncertainPoses) {
+    Random random(11);
+    uint32_t deep = 0, out = 0;
+    for (int i = 0; i < 400; ++i) {
+        const auto scale = static_cast<float>(random.log_in(0.3, 3)), radius = static_cast<float>(random.in(0, 0.2));
+        const auto off = static_cast<float>(i % 3 == 0 ? 0 : random.in(0, 0.03));
+        const auto changed = [&](const Tree& tree) { return *tree.view().scaled(scale)->rounded(radius); };
+        const Solid x(changed(torus().covers)), y(crossed().covers.view());
+        const TreeView exact_x = changed(torus().exact), exact_y = crossed().exact.view();
+        const float far = i % 4 == 0 ? 1e4f : 0;
+        const Pose a{{far, -far, far}, random.rotation()};
+        Pose b = near_pose(random);
+        b.translation = {b.translation.x * scale + far, b.translation.y * scale - far, b.translation.z * scale + far};
+        ContactManifolds manifolds;
+        const SolidsOptions options{.margin = i % 5 == 0 ? 0.1f : 0, .uncertainty = off};
+        const SolidsContacts found = contacts(x, a, y, b, manifolds, context(), options);
+        ASSERT_EQ(found.verdict, collide(x, a, y, b, context(), options).verdict) << i;
+        const SolidsContacts back = contacts(y, b, x, a, manifolds, context(), options);
+        EXPECT_EQ(back.depth_lower, found.depth_lower) << i;
+        const auto moved = [&](double by, const Vec3& also) {
+            const auto d = random.direction();
+            Pose pose = b;
+            pose.translation.x += static_cast<float>(by * d[0] + double{also.x});
+            pose.translation.y += static_cast<float>(by * d[1] + double{also.y});
+            pose.translation.z += static_cast<float>(by * d[2] + double{also.z});
+            return collide(exact_x, a, exact_y, pose, context()).verdict;
+        };
+        const double rounding = 4e-3 * (far > 0); // of the poses that this test makes
+        for (int k = 0; k < 6; ++k) {
+            if (found.depth_lower > rounding) {
+                ++deep;
+                ASSERT_EQ(moved(0.999 * (found.depth_lower + double{off} - rounding), {}), Verdict::overlapping) << i;
+            }
+            if (double{off} >= rounding || rounding == 0) {
+                ++out;
+                ASSERT_EQ(moved(0.999 * (double{off} - rounding), found.way_out), Verdict::separated) << i;
+            }
+        }
+    }
+    EXPECT_GT(deep, 500u);
+    EXPECT_GT(out, 1000u);
+}
+
 TEST_F(Solids, PairsOfAWorldAreAnsweredAsTwoSolids) {
     Random random(10);
     constexpr HalfSpace kFloor{{0, 0, 3}, -1.2f};
