@@ -1,14 +1,16 @@
 // A deforming body near another one: the bounded deformation tree against trees that are refitted each frame.
 //
-//   bench_deform BODY OTHER [--ellipsoids N] [--modes M] [--queries N] [--truth N] [--amplitude A]
+//   bench_deform BODY OTHER [--ellipsoids N] [--modes M] [--bones B] [--queries N] [--truth N] [--amplitude A]
 //
 // BODY moves by M smooth modes (a bend, and waves along random directions; their ranges together move a vertex by about
-// A of the diagonal), OTHER is rigid and turned at random, near to where it first meets BODY at rest. Printed are the
-// median thread CPU time of a query of covers and of exact trees, each at new coordinates and a new pose; and what FCL
-// and Coal take for the first of these, if they were there at configure time: moving the vertices, refitting their
-// trees of AABB, or for 50 of them of OBBRSS, and their query. The program fails if covers call separated what exact
-// trees or the other libraries say meets, or exact trees what these say does.
+// A of the diagonal), or by B bones (rig.hpp), each of which turns by up to --angle degrees about its joint; OTHER is
+// rigid and turned at random, near to where it first meets BODY at rest. Printed are the median thread CPU time of a
+// query of covers and of exact trees, each at new coordinates and a new pose; and what FCL and Coal take for the first
+// of these, if they were there at configure time: moving the vertices, refitting their trees of AABB, or for 50 of them
+// of OBBRSS, and their query. The program fails if covers call separated what exact trees or the other libraries say
+// meets, or exact trees what these say does.
 #include "bench/deform/refit.hpp"
+#include "bench/deform/rig.hpp"
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
@@ -38,8 +40,8 @@ using scenes::Point;
 using scenes::Random;
 
 struct Settings {
-    uint32_t ellipsoids = 64, modes = 10, queries = 10000, truth = 300;
-    double amplitude = 0.05;
+    uint32_t ellipsoids = 64, modes = 10, bones = 0, queries = 10000, truth = 300;
+    double amplitude = 0.05, angle = 30;
     std::string quality = "fast";
 };
 
@@ -70,10 +72,29 @@ struct Box {
     double diagonal() const { return std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]); }
 };
 
-// A mesh, its modes, and where it is.
+// How a body is deformed.
+struct Shape {
+    std::vector<float> q;
+    std::vector<BoneMatrix> bones;
+};
+
+// A mesh, and its modes or its bones.
 struct Body {
     Mesh mesh;
     std::vector<float> displacements, ranges;
+    bench::Rig rig;
+    uint32_t bones = 0;
+    double angle = 0;
+
+    void add_bones(uint32_t count, double degrees) {
+        rig = bench::Rig(mesh, count), bones = count, angle = degrees * std::acos(-1.0) / 180;
+    }
+    Shape random_shape(Random& random) const {
+        Shape out;
+        for (const float r : ranges) out.q.push_back(static_cast<float>(random.in(-1, 1)) * r);
+        if (bones > 0) out.bones = rig.random_pose(random, angle);
+        return out;
+    }
 
     void add_modes(uint32_t count, double amplitude) {
         Random random(17);
@@ -93,7 +114,9 @@ struct Body {
         }
     }
     Modes modes() const { return {displacements, ranges}; }
-    void move(const std::vector<float>& q, std::vector<Point>& out) const {
+    void move(const Shape& shape, std::vector<Point>& out) const {
+        const std::vector<float>& q = shape.q;
+        if (bones > 0) return rig.move(shape.bones, out);
         const size_t n = mesh.vertices.size();
         for (size_t v = 0; v < n; ++v) out[v] = {mesh.vertices[v].x, mesh.vertices[v].y, mesh.vertices[v].z};
         for (size_t m = 0; m < q.size(); ++m) {
@@ -113,17 +136,19 @@ Tree bake(const Body& body, bool exact, const Settings& settings) {
     if (!exact) options.ellipsoids = settings.ellipsoids;
     auto built = build(body.mesh.view(), options);
     if (!built) throw std::runtime_error(built.error().what);
-    if (body.ranges.empty()) return std::move(built->tree);
+    if (body.ranges.empty() && body.bones == 0) return std::move(built->tree);
     const double start = microseconds();
-    auto out = add_modes(built->tree.view(), body.mesh.view(), body.modes());
+    auto out = body.bones > 0 ? add_skin(built->tree.view(), body.mesh.view(), body.rig.weights())
+                              : add_modes(built->tree.view(), body.mesh.view(), body.modes());
     if (!out) throw std::runtime_error(out.error().what);
-    fmt::print("{}: {} bytes without modes, {} with; modes took {:.2f} s\n", exact ? "exact" : "cover",
-               built->tree.bytes().size(), out->bytes().size(), microseconds(start) * 1e-6);
+    const char* const what = body.bones > 0 ? "bones" : "modes";
+    fmt::print("{}: {} bytes without {}, {} with; {} took {:.2f} s\n", exact ? "exact" : "cover",
+               built->tree.bytes().size(), what, out->bytes().size(), what, microseconds(start) * 1e-6);
     return std::move(*out);
 }
 
 struct Question {
-    std::vector<float> q;
+    Shape shape;
     Pose pose; // of the other body
 };
 // The other body comes along a random direction until it first meets the body at rest, at t, by bisection with exact
@@ -131,7 +156,7 @@ struct Question {
 Question ask(const Body& body, const TreeView& exact, const TreeView& other, Random& random, QueryContext& context) {
     constexpr int kBisections = 14;
     Question out;
-    for (const float r : body.ranges) out.q.push_back(static_cast<float>(random.in(-1, 1)) * r);
+    out.shape = body.random_shape(random);
     const Box box(body.mesh);
     const Point to = random.direction(), middle = box.center();
     const Quat rotation = random.rotation();
@@ -163,7 +188,8 @@ Answers answer(const TreeView& body, const TreeView& other, const std::vector<Qu
     std::vector<double> times;
     for (const Question& question : questions) {
         const double start = microseconds();
-        const DeformedCollideResult r = collide({body, {}, question.q}, {other, question.pose}, *context);
+        const DeformedCollideResult r =
+            collide({body, {}, question.shape.q, question.shape.bones}, {other, question.pose}, *context);
         times.push_back(microseconds(start));
         out.verdicts.push_back(r.verdict);
         out.separated += r.verdict == Verdict::separated;
@@ -182,7 +208,9 @@ bool measure_distances(const char* name, const TreeView& body, const TreeView& o
     bool sound = true;
     for (size_t i = 0; i < questions.size(); ++i) {
         const double start = microseconds();
-        const DeformedDistanceResult r = distance({body, {}, questions[i].q}, {other, questions[i].pose}, *context);
+        const Shape& shape = questions[i].shape;
+        const DeformedDistanceResult r =
+            distance({body, {}, shape.q, shape.bones}, {other, questions[i].pose}, *context);
         times.push_back(microseconds(start));
         tests += static_cast<double>(r.stats.tests()) / static_cast<double>(questions.size());
         sound = sound && r.verdict == known.verdicts[i] && r.lower <= r.upper;
@@ -221,7 +249,7 @@ uint32_t compare(const bench::RefitLibrary& library, const Body& body, const Bod
     uint32_t missed = 0, meeting = 0, disagree = 0;
     for (size_t i = 0; i < count; ++i) {
         double start = microseconds();
-        body.move(questions[i].q, moved);
+        body.move(questions[i].shape, moved);
         moving.push_back(microseconds(start));
         start = microseconds();
         refitted->refit(moved);
@@ -245,12 +273,18 @@ int run(const std::string& body_file, const std::string& other_file, const Setti
     const auto read = [](const std::string& file) {
         auto mesh = load_mesh(file.c_str());
         if (!mesh) throw std::runtime_error(file + ": " + mesh.error().what);
-        return Body{std::move(*mesh), {}, {}};
+        Body out;
+        out.mesh = std::move(*mesh);
+        return out;
     };
     Body body = read(body_file);
     const Body other = read(other_file);
-    body.add_modes(settings.modes, settings.amplitude);
-    fmt::print("{} triangles, {} modes, against {} triangles\n", body.mesh.triangles.size(), settings.modes,
+    if (settings.bones > 0)
+        body.add_bones(settings.bones, settings.angle);
+    else
+        body.add_modes(settings.modes, settings.amplitude);
+    fmt::print("{} triangles, {} {}, against {} triangles\n", body.mesh.triangles.size(),
+               settings.bones > 0 ? settings.bones : settings.modes, settings.bones > 0 ? "bones" : "modes",
                other.mesh.triangles.size());
     const Tree cover = bake(body, false, settings), exact = bake(body, true, settings),
                other_cover = bake(other, false, settings), other_exact = bake(other, true, settings);
@@ -290,6 +324,8 @@ int main(int argc, char** argv) {
     app.add_option("other", other)->required();
     app.add_option("--ellipsoids", settings.ellipsoids)->capture_default_str();
     app.add_option("--modes", settings.modes)->capture_default_str();
+    app.add_option("--bones", settings.bones, "in the place of modes");
+    app.add_option("--angle", settings.angle, "by which a bone turns at most, degrees")->capture_default_str();
     app.add_option("--queries", settings.queries)->capture_default_str();
     app.add_option("--truth", settings.truth, "queries that other libraries are asked, too")->capture_default_str();
     app.add_option("--amplitude", settings.amplitude, "of all modes together, part of the diagonal")
