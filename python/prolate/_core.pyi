@@ -32,6 +32,7 @@ class Tree:
     def level_end(self, level: int) -> int: ...
     def inner_range(self) -> Optional[tuple[int, int]]: ...
     def mode_range_array(self) -> NDArray[np.float32]: ...
+    def count_bones(self) -> int: ...
     def info_dict(self) -> dict[str, Any]: ...
     def cut_arrays(self, level: object) -> tuple[_Floats, _Floats, _Floats, _Floats, _Floats, _Index, _Index]: ...
     def mesh_arrays(self) -> tuple[NDArray[np.float32], NDArray[np.uint32]]: ...
@@ -181,9 +182,11 @@ def collide_deformed(
     a: object,
     poses_a: object,
     q_a: object,
+    bones_a: object,
     b: object,
     poses_b: object,
     q_b: object,
+    bones_b: object,
     margin: object,
     max_level: object,
     budget: object,
@@ -194,9 +197,11 @@ def distance_deformed(
     a: object,
     poses_a: object,
     q_a: object,
+    bones_a: object,
     b: object,
     poses_b: object,
     q_b: object,
+    bones_b: object,
     tolerance: object,
     max_distance: object,
     max_level: object,
@@ -208,6 +213,7 @@ def raycast_deformed(
     tree: object,
     pose: object,
     q: object,
+    bones: object,
     origins: object,
     directions: object,
     radius: object,
@@ -219,6 +225,15 @@ def raycast_deformed(
 ) -> tuple[_HitArrays, bool]: ...
 def add_modes(
     tree: object, vertices: object, faces: object, placement: object, modes: object, ranges: object
+) -> _Bytes: ...
+def add_skin(
+    tree: object,
+    vertices: object,
+    faces: object,
+    placement: object,
+    joints: object,
+    weights: object,
+    bones: object,
 ) -> _Bytes: ...
 def distance_solids(
     a: object,

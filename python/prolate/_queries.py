@@ -162,6 +162,21 @@ def collide_solids(
     return _VERDICTS[found] if isinstance(found, int) else found
 
 
+def _matrices(bones: ArrayLike | None, name: str) -> Any:
+    """Of each pose 12 numbers for each bone."""
+    if bones is None:
+        return None
+    import numpy as np
+
+    try:
+        out = np.asarray(bones, dtype=float)
+    except (ValueError, TypeError) as error:
+        raise type(error)(f"{name}: {error}; give matrices of shape (B, 3, 4)") from None
+    if out.ndim not in (3, 4) or out.shape[-2:] not in ((3, 4), (4, 4)):
+        raise ValueError(f"{name}: must have shape (B, 3, 4) or (N, B, 3, 4), not {out.shape}")
+    return np.ascontiguousarray(out[..., :3, :]).reshape(*out.shape[:-3], 12 * out.shape[-3])
+
+
 def collide_deformed(
     a: Tree,
     poses_a: ArrayLike,
@@ -170,13 +185,15 @@ def collide_deformed(
     *,
     q_a: ArrayLike | None = None,
     q_b: ArrayLike | None = None,
+    bones_a: ArrayLike | None = None,
+    bones_b: ArrayLike | None = None,
     margin: float = 0,
     max_level: int | None = None,
     budget: int | None = None,
     threads: int = 1,
     order: Order = "xyzw",
 ) -> Any:
-    """Do two bodies that deform by modes meet, at each of N poses and coordinates? Without a vertex, by their nodes.
+    """Do two bodies that deform by modes or bones meet, at each of N poses? Without a vertex, by their nodes.
 
     ``SEPARATED`` is certain of the deformed meshes. ``OVERLAPPING``: deformed triangles meet, or of trees without
     triangles leaf ellipsoids, as their coordinates move and enlarge them; or one body may lie inside the other.
@@ -184,21 +201,28 @@ def collide_deformed(
     Parameters
     ----------
     a, poses_a, b, poses_b, margin, max_level, budget, threads, order
-        As for :func:`collide`. Trees of :meth:`Tree.with_modes`, or rigid ones.
+        As for :func:`collide`. Trees of :meth:`Tree.with_modes` or :meth:`Tree.with_skin`, or rigid ones.
     q_a, q_b : array of shape (M,) or (N, M), optional
         Coordinates of the bodies, rounded to float32; without, they are at rest. One row goes with all of the others.
+    bones_a, bones_b : array of shape (B, 3, 4), (B, 4, 4), (N, B, 3, 4) or (N, B, 4, 4), optional
+        Where each bone takes the mesh: affine maps in its frame, rounded to float32, the last row of a 4x4 left out.
+        In an animation the joint's matrix times its inverse bind matrix. Without, all are the identity.
 
     Returns
     -------
     uint8 array of shape (N,), or a Verdict if poses and coordinates are single
-        ``UNDECIDED`` if the budget ran out, or a coordinate is NaN or beyond :attr:`Tree.mode_ranges`: no bound holds.
+        ``UNDECIDED`` if the budget ran out, or a coordinate is NaN or beyond :attr:`Tree.mode_ranges`: no bound holds;
+        or a matrix is not finite, or has a factor above 1024.
 
     Raises
     ------
     ValueError, TypeError
-        As :func:`collide`; for coordinates of another number than the tree has modes.
+        As :func:`collide`; for coordinates of another number than the tree has modes, or bones.
     """
-    found = _core.collide_deformed(a, poses_a, q_a, b, poses_b, q_b, margin, max_level, budget, threads, order)
+    flat_a, flat_b = _matrices(bones_a, "bones_a"), _matrices(bones_b, "bones_b")
+    found = _core.collide_deformed(
+        a, poses_a, q_a, flat_a, b, poses_b, q_b, flat_b, margin, max_level, budget, threads, order
+    )
     return _VERDICTS[found] if isinstance(found, int) else found
 
 
@@ -210,6 +234,8 @@ def distance_deformed(
     *,
     q_a: ArrayLike | None = None,
     q_b: ArrayLike | None = None,
+    bones_a: ArrayLike | None = None,
+    bones_b: ArrayLike | None = None,
     tolerance: float = 1e-6,
     max_distance: float | None = None,
     max_level: int | None = None,
@@ -224,7 +250,7 @@ def distance_deformed(
 
     Parameters
     ----------
-    a, poses_a, b, poses_b, q_a, q_b
+    a, poses_a, b, poses_b, q_a, q_b, bones_a, bones_b
         As for :func:`collide_deformed`.
     tolerance, max_distance, max_level, budget, threads, order
         As for :func:`distance`.
@@ -240,8 +266,9 @@ def distance_deformed(
     ValueError, TypeError
         As :func:`collide_deformed`.
     """
+    flat_a, flat_b = _matrices(bones_a, "bones_a"), _matrices(bones_b, "bones_b")
     arrays, single = _core.distance_deformed(
-        a, poses_a, q_a, b, poses_b, q_b, tolerance, max_distance, max_level, budget, threads, order
+        a, poses_a, q_a, flat_a, b, poses_b, q_b, flat_b, tolerance, max_distance, max_level, budget, threads, order
     )
     return Distances(*(x[0] for x in arrays)) if single else Distances(*arrays)
 
@@ -254,6 +281,7 @@ def raycast_deformed(
     radius: float = 0,
     *,
     q: ArrayLike | None = None,
+    bones: ArrayLike | None = None,
     max_t: float | None = None,
     max_level: int | None = None,
     budget: int | None = None,
@@ -267,6 +295,7 @@ def raycast_deformed(
     tree, pose, origins, directions, radius, max_t, max_level, budget, threads, order
         As for :func:`raycast`. A tree of :meth:`Tree.with_modes`, or a rigid one.
     q : array of shape (M,) or (N, M), optional
+    bones : array of shape (B, 3, 4), (B, 4, 4), (N, B, 3, 4) or (N, B, 4, 4), optional
         As for :func:`collide_deformed`.
 
     Returns
@@ -280,7 +309,7 @@ def raycast_deformed(
         As :func:`raycast`; for coordinates of another number than the tree has modes.
     """
     arrays, single = _core.raycast_deformed(
-        tree, pose, q, origins, directions, radius, max_t, max_level, budget, threads, order
+        tree, pose, q, _matrices(bones, "bones"), origins, directions, radius, max_t, max_level, budget, threads, order
     )
     return Hits(*(x[0] for x in arrays)) if single else Hits(*arrays)
 

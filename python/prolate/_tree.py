@@ -211,17 +211,64 @@ class Tree(_core.Tree):
             displacements = np.asarray(modes, dtype=float)
         except (ValueError, TypeError) as error:
             raise type(error)(f"modes: {error}; give an array (M, V, 3)") from None
-        placement: Any
-        if isinstance(mesh, Mesh):
-            vertices, triangles, placement = mesh.vertices, mesh.faces, (mesh.scale, mesh.origin)
-        else:
-            vertices, triangles = (mesh, faces) if faces is not None else arrays_of(mesh)
-            known = self.info_dict()
-            origin = known["origin"] if any(known["origin"]) else False
-            vertices, triangles, placement = placed(vertices, triangles, known["scale"], origin)
-            if displacements.ndim == 3 and displacements.shape[2] == 3:
-                displacements = displacements * np.asarray(known["scale"])
+        vertices, triangles, placement = self._baked_from(mesh, faces)
+        if not isinstance(mesh, Mesh) and displacements.ndim == 3 and displacements.shape[2] == 3:
+            displacements = displacements * np.asarray(self.info_dict()["scale"])
         return Tree(_core.add_modes(self, vertices, triangles, placement, displacements, ranges))
+
+    def with_skin(
+        self, mesh: Any, faces: Any = None, *, joints: ArrayLike, weights: ArrayLike, bones: int | None = None
+    ) -> Tree:
+        """The same tree with bounds of how bones move its nodes, proved. :func:`collide_deformed` asks about it.
+
+        With a matrix ``T[b]`` for each bone, vertex ``v`` is at ``sum(weights[v, i] * T[joints[v, i]] @ vertices[v])``
+        over the sum of its weights (linear blend skinning), and the nodes hold the mesh for all matrices. Other queries
+        answer for the mesh at rest. Modes (:meth:`with_modes`) move the vertices before bones do.
+
+        Parameters
+        ----------
+        mesh, faces
+            What the tree was baked from, as for :meth:`verify`.
+        joints, weights : arrays (V, W)
+            Which bones move each vertex, at most 8, and how much: at least 0, the sum 1 within 0.01. Weights are
+            rounded to float32. A bone of weight 0 means nothing. Vertices in one place must move alike.
+        bones : int, optional
+            How many there are, at most 1024; by default, as many as ``joints`` names.
+
+        Raises
+        ------
+        Error, ValueError, TypeError
+            For weights of another number of vertices, below 0, not finite, or of another sum; for another mesh; for a
+            tree that has a skin already, and one of a filled mesh.
+        """
+        import numpy as np
+
+        try:
+            which, much = np.asarray(joints), np.asarray(weights, dtype=float)
+        except (ValueError, TypeError) as error:
+            raise type(error)(f"weights: {error}; give an array (V, W)") from None
+        if which.shape != much.shape or which.ndim != 2:
+            raise ValueError(f"joints and weights: must both have shape (V, W), not {which.shape} and {much.shape}")
+        which = np.where(much == 0, 0, which)
+        if not np.issubdtype(which.dtype, np.integer) or which.size == 0 or not 0 <= which.min() <= which.max() < 1024:
+            raise ValueError("joints: must be integers from 0 to 1023")
+        count = int(which.max()) + 1 if bones is None else bones
+        vertices, triangles, placement = self._baked_from(mesh, faces)
+        return Tree(_core.add_skin(self, vertices, triangles, placement, which.astype(float), much, count))
+
+    def _baked_from(self, mesh: Any, faces: Any) -> tuple[Any, Any, Any]:
+        """Vertices, faces and placement of the mesh that the tree was baked from."""
+        if isinstance(mesh, Mesh):
+            return mesh.vertices, mesh.faces, (mesh.scale, mesh.origin)
+        vertices, triangles = (mesh, faces) if faces is not None else arrays_of(mesh)
+        known = self.info_dict()
+        origin = known["origin"] if any(known["origin"]) else False
+        return placed(vertices, triangles, known["scale"], origin)
+
+    @property
+    def bone_count(self) -> int:
+        """How many bones move it; 0 without a skin."""
+        return self.count_bones()
 
     @property
     def mode_ranges(self) -> NDArray[np.float32]:

@@ -4,6 +4,7 @@
 
 #include <prolate/build.hpp>
 #include <prolate/modes.hpp>
+#include <prolate/rig.hpp>
 #include <prolate/verify.hpp>
 
 #include <chrono>
@@ -286,6 +287,27 @@ nb::object add_modes_to(nb::handle tree, nb::handle vertices, nb::handle faces, 
     return owned_bytes(added->bytes());
 }
 
+// Bytes of the tree with its skin. `joints` are whole numbers below kMaxBones.
+nb::object add_skin_to(nb::handle tree, nb::handle vertices, nb::handle faces, nb::handle placement, nb::handle joints,
+                       nb::handle weights, nb::handle bones) {
+    const HeldTree& held = tree_of(tree, "tree");
+    const TakenMesh mesh = take_mesh(vertices, faces, placement);
+    const nb::object keep[2] = {as_numpy(joints, "joints", "float64"), as_numpy(weights, "weights", "float64")};
+    const AnyArray which = import_array(keep[0]), much = import_array(keep[1]);
+    std::vector<uint16_t> indices;
+    std::vector<float> parts;
+    for (size_t i = 0; i < which.size(); ++i)
+        indices.push_back(static_cast<uint16_t>(static_cast<const double*>(which.data())[i])),
+            parts.push_back(static_cast<float>(static_cast<const double*>(much.data())[i]));
+    const BoneWeights given{static_cast<uint32_t>(whole(bones, "bones", 1, kMaxBones)),
+                            static_cast<uint32_t>(which.shape(1)), indices, parts};
+    Progress progress;
+    const auto added = progress.run(nb::none(), [&] { return add_skin(held.view, mesh.view, given); });
+    if (!added && added.error().code == ErrorCode::bad_options) throw nb::value_error(added.error().what);
+    if (!added) throw Failure{added.error(), "index " + std::to_string(added.error().where)};
+    return owned_bytes(added->bytes());
+}
+
 // (source hash, options hash), the key of a cache.
 nb::tuple bake_key(nb::handle vertices, nb::handle faces, nb::handle placement, const nb::dict& options) {
     const BuildOptions wanted = options_of(options);
@@ -388,6 +410,8 @@ void bind_bake(nb::module_& m) {
           nb::arg("options"), nb::arg("progress").none());
     m.def("add_modes", &add_modes_to, nb::arg("tree").none(), nb::arg("vertices").none(), nb::arg("faces").none(),
           nb::arg("placement").none(), nb::arg("modes").none(), nb::arg("ranges").none());
+    m.def("add_skin", &add_skin_to, nb::arg("tree").none(), nb::arg("vertices").none(), nb::arg("faces").none(),
+          nb::arg("placement").none(), nb::arg("joints").none(), nb::arg("weights").none(), nb::arg("bones").none());
     m.def("options_hash", [](const nb::dict& options) { return hash(options_of(options)); });
     m.def("bake_key", &bake_key, nb::arg("vertices").none(), nb::arg("faces").none(), nb::arg("placement").none(),
           nb::arg("options"));

@@ -246,6 +246,11 @@ void bind_tree(nb::module_& m) {
                      for (uint32_t i = 0; i < modes->mode_count(); ++i) ranges.push_back(modes->range(i));
                  return to_numpy(ranges, {ranges.size()});
              })
+        .def("count_bones",
+             [](const HeldTree& self) {
+                 const auto skin = self.view.skin();
+                 return skin ? skin->bone_count() : 0;
+             })
         .def("info_dict", &info_of)
         .def("cut_arrays", &cut, nb::arg("level").none())
         .def("mesh_arrays", &mesh_of);
