@@ -110,9 +110,9 @@ struct SolidsContacts {
 };
 
 /// Where and how deep do the solids touch? The manifolds are those of contacts() of the outer covers: a solver that
-/// resolves them separates the solids. The lower bound of the depth is that of the deepest pair of inner ellipsoids,
-/// about half of what these overlap by. The upper bound comes from moving the outer covers apart along the manifolds'
-/// normals, or if none leads out, away from each other.
+/// resolves them separates the solids. The lower bound of the depth is that of the deepest pair of inner ellipsoids
+/// that is found, 0.9 of what these overlap by. The upper bound comes from moving the outer covers apart along the
+/// manifolds' normals, or if none leads out, away from each other.
 SolidsContacts contacts(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b,
                         ContactManifolds& manifolds, Scratch context, const SolidsOptions& options = {}) noexcept;
 

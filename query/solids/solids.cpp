@@ -7,6 +7,7 @@
 // more than the winding number of its center could be wrong by.
 #include "query/solids/solids.hpp"
 
+#include "query/ellipsoid/depth.hpp"
 #include "query/ellipsoid/gap.hpp"
 #include "query/node/scratch.hpp"
 #include "query/triangle/ellipsoid_distance.hpp"
@@ -43,15 +44,26 @@ bool certainly_within(const PlacedTriangle& a, const PlacedEllipsoid& b, double 
     return glm::length(u) + (off - std::min(within, 0.0)) / least_width(b.factor, b.size) <= 1 - 0x1p-40;
 }
 
-// Is handed pairs of inner ellipsoids that meet.
+// Is handed pairs of inner ellipsoids that meet. A loose bound of each costs little; the pair that is deepest along the
+// direction that it gives is looked at again.
 struct Deepest {
     const CollideSearch& search;
-    double radii, depth = 0;
+    double bound = -HUGE_VAL, estimate = 0; // of the cores
+    MeetingPair deepest = {};
 
+    PlacedEllipsoid a(const MeetingPair& pair) const {
+        return place(search.a.tree.ellipsoid(pair.node_a), search.a.tree.scale());
+    }
+    PlacedEllipsoid b(const MeetingPair& pair) const {
+        return place(search.b.tree.ellipsoid(pair.node_b), search.b.tree.scale(), search.b_to_a);
+    }
     void look(const MeetingPair& pair) {
-        const PlacedEllipsoid a = place(search.a.tree.ellipsoid(pair.node_a), search.a.tree.scale()),
-                              b = place(search.b.tree.ellipsoid(pair.node_b), search.b.tree.scale(), search.b_to_a);
-        depth = std::max(depth, radii - distance_of(a, b, 0).upper);
+        const Gap gap = distance_of(a(pair), b(pair), 0);
+        bound = std::max(bound, -gap.upper);
+        if (-gap.lower > estimate) estimate = -gap.lower, deepest = pair;
+    }
+    double depth() const {
+        return estimate > 0 ? std::max(bound, least_depth(a(deepest), b(deepest), std::max(0.0, bound))) : bound;
     }
 };
 
@@ -132,13 +144,13 @@ double SolidPair::depth() noexcept {
     const double radii = double{inner_a().radius()} + inner_b().radius();
     CollideSearch search(inner_a(), inner_b(), b_to_a_, context_,
                          {.max_pair_tests = left(), .margin = with_radius(0, radii)});
-    Deepest deepest{search, radii};
+    Deepest deepest{search};
     search.all = true;
     search.each = [](void* user, const MeetingPair& pair) { static_cast<Deepest*>(user)->look(pair); };
     search.each_user = &deepest;
     traverse(search);
     add(search.stats, stats);
-    return deepest.depth * (1 - 0x1p-50);
+    return std::max(0.0, (deepest.depth() + radii) * (1 - 0x1p-50));
 }
 
 } // namespace query
