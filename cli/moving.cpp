@@ -61,15 +61,4 @@ Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& a
     return out;
 }
 
-std::vector<Vec3> moved_vertices(const std::vector<Vec3>& vertices, const std::vector<float>& displacements,
-                                 const std::vector<float>& q) {
-    std::vector<Vec3> out = vertices;
-    for (size_t m = 0; m < q.size(); ++m)
-        for (size_t v = 0; v < out.size(); ++v) {
-            const float* u = &displacements[3 * (m * out.size() + v)];
-            out[v].x += q[m] * u[0], out[v].y += q[m] * u[1], out[v].z += q[m] * u[2];
-        }
-    return out;
-}
-
 } // namespace prolate::cli

@@ -31,8 +31,4 @@ std::vector<float> displacements_of(const TreeView& exact_tree);
 Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& as_read,
                                              const std::vector<Vec3>& vertices, const std::string& modes_path);
 
-/// Each vertex at x + sum of q times its displacements.
-std::vector<Vec3> moved_vertices(const std::vector<Vec3>& vertices, const std::vector<float>& displacements,
-                                 const std::vector<float>& q);
-
 } // namespace prolate::cli

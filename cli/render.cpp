@@ -6,6 +6,7 @@
 #include "cli/outputs.hpp"
 #include "cli/progress_line.hpp"
 #include "cli/render/sheet.hpp"
+#include "cli/shown_mesh.hpp"
 #include "cli/threads.hpp"
 #include "cli/view_option.hpp"
 #include "cli/words.hpp"
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <iterator>
 #include <memory>
 
@@ -27,6 +29,7 @@ Examples:
   prolate render horse.etree horse.obj -o horse.png --levels 3 --view 120,30 --size 800x800
   prolate render horse.etree horse.obj -o heat.png --heat --mesh none
   prolate render horse.etree horse.obj -o cut.png --section z,0.4
+  prolate render moving.etree horse.obj --modes modes.npz --mesh overlay --at 1,0 --at=-1,0.5 -o moving.png
   prolate render horse.etree -o - --up z | display)";
 
 constexpr const char* kMeshStyles[] = {"beside", "overlay", "none"}; // in the order of MeshStyle
@@ -38,7 +41,8 @@ struct RenderArguments {
     ViewWords view;
     Outputs outputs;
     std::vector<uint32_t> levels;
-    std::string mesh_style = "beside", section;
+    std::string mesh_style = "beside", section, modes;
+    std::vector<std::string> at;
     bool no_shadow = false, heat = false;
     double heat_top = 0;
     uint32_t samples = SheetOptions{}.samples, threads = 0;
@@ -67,6 +71,33 @@ bool parse_section(const std::string& text, std::optional<SectionPlane>& section
     return true;
 }
 
+// "1,-0.5": coordinates of a tree that deforms.
+Outcome<std::vector<float>> parse_coordinates(const std::string& text, const TreeView& tree) {
+    const auto bad = [&text](std::string what, std::string advice) {
+        return Failure{kUsage, "--at " + text, std::move(what), std::move(advice)};
+    };
+    const auto modes = tree.deformation();
+    if (!modes) return bad("the tree does not deform", "bake it with --modes");
+    std::vector<float> out;
+    for (const char *at = text.data(), *const end = at + text.size();; ++at) {
+        float number = 0;
+        const auto [rest, error] = std::from_chars(at, end, number);
+        if (error != std::errc() || (rest != end && *rest != ','))
+            return bad("not numbers with commas between them", "write it as 1,-0.5");
+        out.push_back(number);
+        if ((at = rest) == end) break;
+    }
+    if (out.size() != modes->mode_count())
+        return bad(fmt::format("{} coordinate{} for {} mode{}", out.size(), out.size() == 1 ? "" : "s",
+                               modes->mode_count(), modes->mode_count() == 1 ? "" : "s"),
+                   "give one for each");
+    for (uint32_t m = 0; m < out.size(); ++m)
+        if (!(std::abs(out[m]) <= modes->range(m)))
+            return bad(fmt::format("mode {} goes from -{:g} to {:g}", m + 1, modes->range(m), modes->range(m)),
+                       "stay within, or bake with a larger --range");
+    return out;
+}
+
 template <size_t kCount> size_t index_of(const char* const (&words)[kCount], const std::string& word) {
     return static_cast<size_t>(std::find(std::begin(words), std::end(words), word) - std::begin(words));
 }
@@ -85,7 +116,9 @@ Outcome<SheetOptions> sheet_options(const RenderArguments& a) {
                        "write it as x, y or z, or with a part of the extent, as z,0.4"};
     out.heat = a.heat || a.heat_top > 0;
     out.heat_top = a.heat_top;
-    if (a.mesh.empty() && (out.heat || a.mesh_style == "overlay"))
+    if (out.heat && !a.at.empty())
+        return Failure{kUsage, "--heat", "distances are those of the body at rest", "leave out --at, or --heat"};
+    if (a.mesh.empty() && a.at.empty() && (out.heat || a.mesh_style == "overlay"))
         return Failure{kUsage, out.heat ? "--heat" : "--mesh overlay", "there is no mesh",
                        "name the mesh after the tree"};
     if (out.heat && a.mesh_style == "overlay")
@@ -110,20 +143,31 @@ Outcome<ExitCode> run(RenderArguments& a) {
     if (!options) return options.error();
     a.outputs.reads(a.tree, "the tree");
     a.outputs.reads_mesh(a.mesh, "the mesh");
+    a.outputs.reads(a.modes, "the modes");
     if (const auto claimed = a.outputs.claim(a.output, "the picture", "png"); !claimed) return claimed.error();
     const auto tree = read_tree(a.tree);
     if (!tree) return tree.error();
     const TreeView view = tree->view();
+    for (const std::string& text : a.at) {
+        auto q = parse_coordinates(text, view);
+        if (!q) return q.error();
+        options->at.push_back(std::move(*q));
+    }
     std::optional<CleanMesh> mesh;
-    if (!a.mesh.empty()) {
-        auto read = read_mesh_of(view, a.mesh, a.mesh_options);
+    if (!a.mesh.empty() || !a.modes.empty() || !a.at.empty()) {
+        auto read = read_shown_mesh(view, a.mesh, a.mesh_options, a.modes);
         if (!read) return read.error();
         if (!read->own)
             note(a.mesh,
                  fmt::format("not the mesh that {} was baked from{}", a.tree,
                              options->heat ? ": the colours show how far the tree sticks out of another one" : ""));
-        mesh = std::move(read->cleaned);
+        mesh = std::move(read->mesh);
+        options->displacements = std::move(read->displacements);
+        if (options->mesh_style == MeshStyle::overlay && !a.at.empty() && options->displacements.empty())
+            return Failure{kUsage, "--mesh overlay", "how the mesh moves is not known", "name it and its --modes"};
     }
+    // Of a body that moves, all that there is.
+    if (options->levels.empty() && !a.at.empty()) options->levels.push_back(view.level_count() - 1);
     // The root is by far the largest, so it would make all else small: it is shown only if asked for.
     if (options->levels.empty())
         for (uint32_t level = std::min(1u, view.level_count() - 1); level < std::min(4u, view.level_count()); ++level)
@@ -164,6 +208,14 @@ void add_render(CLI::App& app, Work& chosen) {
         "--section", a->section,
         "cut away the viewer's side of a plane across x, y or z (halfway, or at 0.4 of the extent for z,0.4), and show "
         "the mesh's section within the tree's, and an inner cover's within the mesh's");
+    command
+        ->add_option("--at", a->at,
+                     "show a tree that deforms at these coordinates beside the one at rest; can be given again")
+        ->type_name("Q1,Q2,...")
+        ->allow_extra_args(false);
+    command->add_option(
+        "--modes", a->modes,
+        "the modes that the tree was baked with: the mesh then moves with it (an exact tree knows them)");
     command->add_flag("--heat", a->heat,
                       "colour by how far the tree sticks out of the mesh, and print the mean and the maximum, or for "
                       "open meshes the 99th percentile");

@@ -3,11 +3,11 @@
 #include "cli/console.hpp"
 #include "cli/inputs.hpp"
 #include "cli/mesh_options.hpp"
-#include "cli/moving.hpp"
 #include "cli/outputs.hpp"
 #include "cli/pose.hpp"
 #include "cli/progress_line.hpp"
 #include "cli/render/camera.hpp"
+#include "cli/shown_mesh.hpp"
 #include "cli/threads.hpp"
 #include "cli/view/scene.hpp"
 #include "cli/words.hpp"
@@ -70,9 +70,7 @@ std::string name_of(const std::string& path) {
 struct ViewedAsset {
     std::string tree_path, mesh_path;
     std::optional<Tree> tree;
-    std::optional<CleanMesh> mesh;
-    bool own_mesh = true;
-    std::vector<float> displacements = {}; // of the mesh's vertices, as modes move them; or unknown
+    ShownMesh shown;
 };
 
 // Which mesh belongs to which tree; nothing if that is not clear.
@@ -80,7 +78,7 @@ std::optional<std::vector<ViewedAsset>> sort_files(const std::vector<std::string
     std::vector<ViewedAsset> assets;
     for (const std::string& path : files) {
         if (is_tree(path) || (assets.empty() && is_standard_input(path)))
-            assets.push_back({path, "", {}, {}, true});
+            assets.push_back({path, "", {}, {}});
         else if (!assets.empty() && assets.back().mesh_path.empty())
             assets.back().mesh_path = path;
         else
@@ -90,27 +88,13 @@ std::optional<std::vector<ViewedAsset>> sort_files(const std::vector<std::string
 }
 
 Outcome<> read_asset(ViewedAsset& asset, const MeshOptions& mesh_options, const std::string& modes_path) {
-    auto read = read_tree(asset.tree_path);
-    if (!read) return read.error();
-    asset.tree = std::move(*read);
-    const TreeView tree = asset.tree->view();
-    if (!asset.mesh_path.empty()) {
-        auto mesh = read_mesh_of(tree, asset.mesh_path, mesh_options);
-        if (!mesh) return mesh.error();
-        asset.own_mesh = mesh->own;
-        if (!asset.own_mesh) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
-        if (!modes_path.empty()) {
-            auto displacements = displacements_of(tree, mesh->as_read, mesh->cleaned.mesh.vertices, modes_path);
-            if (!displacements) return displacements.error();
-            asset.displacements = std::move(*displacements);
-        }
-        asset.mesh = std::move(mesh->cleaned);
-    }
-    // By the numbers of the tree's own vertices it knows how they move.
-    if (tree.has_triangles() && asset.own_mesh && (!asset.mesh || tree.deformation())) {
-        asset.mesh = mesh_of(tree);
-        if (tree.deformation()) asset.displacements = displacements_of(tree);
-    }
+    auto tree = read_tree(asset.tree_path);
+    if (!tree) return tree.error();
+    asset.tree = std::move(*tree);
+    auto shown = read_shown_mesh(asset.tree->view(), asset.mesh_path, mesh_options, modes_path);
+    if (!shown) return shown.error();
+    asset.shown = std::move(*shown);
+    if (!asset.shown.own) note(asset.mesh_path, fmt::format("not the mesh that {} was baked from", asset.tree_path));
     return kSuccess;
 }
 
@@ -129,8 +113,6 @@ Outcome<Request> request_of(const ViewArguments& a) {
                        "name one or two .etree files, each with at most one mesh after it"};
     if (assets->size() > 2)
         return Failure{kUsage, "view", fmt::format("{} trees are too many", assets->size()), "name one or two"};
-    if (!a.modes.empty() && assets->front().mesh_path.empty())
-        return Failure{kUsage, "--modes", "there is no mesh that they move", "name the mesh after the tree"};
     const bool two = assets->size() == 2;
     Request out{std::move(*assets), {}};
     if (!a.pose.empty()) {
@@ -171,7 +153,7 @@ Outcome<ExitCode> run(ViewArguments& a) {
         if (const auto read = read_asset(asset, a.mesh_options, first ? a.modes : ""); !read) return read.error();
         ProgressLine line;
         auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
-                               std::move(asset.mesh), asset.own_mesh, std::move(asset.displacements)},
+                               std::move(asset.shown.mesh), asset.shown.own, std::move(asset.shown.displacements)},
                               numbers, two, [&line](double fraction) { return line.show("measuring", fraction); });
         if (!body) return failure_of("view", Error{ErrorCode::cancelled});
         scene["bodies"].push_back(std::move(*body));

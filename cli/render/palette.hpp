@@ -30,6 +30,8 @@ Oklch branch_colour(uint32_t i, uint32_t n);
 /// The neutral grey of the root and of meshes.
 inline constexpr Oklch kNeutral = {0.80, 0.004, 1.2};
 
+/// Of the outer cover where an inner one is shown: its nodes' own hues would be taken for it.
+inline constexpr Oklch kOuter = {0.77, 0.13, 1.25};
 /// Of an inner cover, where a section shows it in the mesh.
 inline constexpr Oklch kInner = {0.52, 0.09, 4.1};
 

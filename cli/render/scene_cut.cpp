@@ -29,7 +29,7 @@ Pose centered(const Frame& frame) {
 
 } // namespace
 
-CutScene::Body::Body(const Ellipsoid& e, const Frame& frame)
+FramedEllipsoid::FramedEllipsoid(const Ellipsoid& e, const Frame& frame)
     : center(frame(e.center)), l11(e.l11 * frame.scale), l21(e.l21 * frame.scale), l22(e.l22 * frame.scale),
       l31(e.l31 * frame.scale), l32(e.l32 * frame.scale), l33(e.l33 * frame.scale), m11(1 / l11),
       m21(-l21 / (l11 * l22)), m22(1 / l22), m31(-(l31 * m11 + l32 * m21) / l33), m32(-l32 / (l22 * l33)),
@@ -84,31 +84,29 @@ Place CutScene::place_of(const dvec3& p) const {
 
 // The slopes s at which the plane through the eye with normal axis - s * forward touches a body seen at d are those
 // where (n.d)^2 = |transpose(L) n|^2: a quadratic in s.
+void FramedEllipsoid::add_to(Window& window, const Camera& camera) const {
+    const dvec3 d = center - camera.eye, lf = transposed(camera.forward);
+    const double df = glm::dot(d, camera.forward), a = df * df - glm::dot(lf, lf);
+    const auto widen = [&](const dvec3& axis, double& low, double& high) {
+        const dvec3 la = transposed(axis);
+        const double da = glm::dot(d, axis), b = da * df - glm::dot(la, lf), c = da * da - glm::dot(la, la);
+        const double root = std::sqrt(std::max(0.0, b * b - a * c));
+        low = std::min(low, (b - root) / a);
+        high = std::max(high, (b + root) / a);
+    };
+    widen(camera.right, window.u0, window.u1);
+    widen(camera.up, window.v0, window.v1);
+}
+
 Window CutScene::window(const Camera& camera) const {
     Window window;
-    for (const uint32_t node : cut_) {
-        const Body& body = bodies_[node];
-        const dvec3 d = body.center - camera.eye, lf = body.transposed(camera.forward);
-        const double df = glm::dot(d, camera.forward), a = df * df - glm::dot(lf, lf);
-        const auto widen = [&](const dvec3& axis, double& low, double& high) {
-            const dvec3 la = body.transposed(axis);
-            const double da = glm::dot(d, axis), b = da * df - glm::dot(la, lf), c = da * da - glm::dot(la, la);
-            const double root = std::sqrt(std::max(0.0, b * b - a * c));
-            low = std::min(low, (b - root) / a);
-            high = std::max(high, (b + root) / a);
-        };
-        widen(camera.right, window.u0, window.u1);
-        widen(camera.up, window.v0, window.v1);
-    }
+    for (const uint32_t node : cut_) bodies_[node].add_to(window, camera);
     return window;
 }
 
 double CutScene::extent(const dvec3& direction) const {
     double most = -std::numeric_limits<double>::infinity();
-    for (const uint32_t node : cut_) {
-        const Body& body = bodies_[node];
-        most = std::max(most, glm::dot(direction, body.center) + glm::length(body.transposed(direction)));
-    }
+    for (const uint32_t node : cut_) most = std::max(most, bodies_[node].extent(direction));
     return most;
 }
 

@@ -1,23 +1,13 @@
 #include "cli/render/sheet.hpp"
-#include "cli/grouped.hpp"
 
-#include "cli/render/heat.hpp"
 #include "cli/render/palette.hpp"
-#include "cli/render/panel.hpp"
-#include "cli/render/scene_cut.hpp"
-#include "cli/render/scene_inner.hpp"
-#include "cli/render/scene_mesh.hpp"
-#include "cli/render/solid.hpp"
-
-#include <prolate/tools.hpp>
+#include "cli/render/stage.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <list>
 #include <memory>
 #include <string>
 
-#include <fmt/format.h>
 #include <tbb/task_arena.h>
 
 namespace prolate::cli {
@@ -28,33 +18,6 @@ using glm::dvec3;
 constexpr double kMargin = 0.07;       // around what is shown, of its own size
 constexpr uint32_t kSmallestCell = 96; // pixels: narrower captions could not be read
 constexpr uint32_t kSmallestText = 5;  // pixels
-
-constexpr double kHeatRelief = 0.4; // so that light and shadow leave colours that the legend explains
-
-// How far a cut sticks out of the mesh, percent of the mesh's diagonal.
-struct Figures {
-    double max = 0, mean = 0, p99 = 0;
-};
-
-struct Panel {
-    PanelContent content;
-    std::string caption;
-};
-
-// All that is drawn, and what it is drawn from.
-struct Stage {
-    Frame frame;
-    Box box;                              // of the mesh, or if there is none, of what is shown
-    std::list<std::vector<float>> growth; // of each tree, node_growth()
-    std::unique_ptr<Solid> solid;         // if needed
-    std::unique_ptr<MeshScene> mesh;      // if shown
-    std::list<CutScene> cuts;             // of the levels to show
-    std::list<InnerScene> inner;          // the mesh with the inner cover at each of them, in sections
-    std::list<MeshScene> surfaces;        // of covers that are no tree
-    std::vector<dvec3> colours;           // by slots
-    std::optional<HeatScale> heat;
-    std::vector<Panel> panels;
-};
 
 struct Layout {
     uint32_t columns = 0, rows = 0;
@@ -89,42 +52,6 @@ Layout choose_layout(uint32_t panels, uint32_t width, uint32_t height, const Win
         }
     }
     return best;
-}
-
-std::string caption_of(const TreeView& tree, uint32_t level, size_t nodes) {
-    const char* shape = tree.bake_info().primitive == Primitive::sphere ? "sphere" : "ellipsoid";
-    return fmt::format("level {}: {} {}{}", level, grouped(nodes), shape, nodes == 1 ? "" : "s");
-}
-
-std::string caption_of(MeshView mesh) {
-    return fmt::format("mesh, {} triangles", grouped(mesh.triangles.size()));
-}
-
-std::string ratio_of(const TreeView& tree, uint32_t level) {
-    const double ratio = tree.level(level).outside_ratio;
-    return std::isfinite(ratio) ? fmt::format(", outside ratio {:.{}f}", ratio, ratio < 0.1 ? 3 : 2) : "";
-}
-
-// Of an open mesh, the largest distance would be that of points deep inside, where nobody sees them.
-std::string words_of(const Figures& f, bool closed) {
-    const auto percent = [](double value) { return fmt::format("{:.{}f} %", value, value < 0.995 ? 2 : 1); };
-    return closed ? fmt::format(", max {}, mean {}", percent(f.max), percent(f.mean))
-                  : fmt::format(", 99 % within {}, mean {}", percent(f.p99), percent(f.mean));
-}
-
-// As the file has them; or measured, if it says nothing, or speaks of another mesh.
-Figures figures_of(const TreeView& tree, uint32_t level, const CleanMesh& mesh, const Solid& solid) {
-    const LevelInfo info = tree.level(level);
-    const BakeInfo bake = tree.bake_info();
-    if (std::isfinite(info.hausdorff_max) && bake.source_hash == hash(mesh.mesh.view()) && bake.diagonal > 0) {
-        const double percent = 100 / bake.diagonal;
-        return {info.hausdorff_max * percent, info.hausdorff_mean * percent, info.hausdorff_p99 * percent};
-    }
-    std::vector<Ellipsoid> cut;
-    tree.for_each_in_cut(level, [&](uint32_t node) { cut.push_back(tree.ellipsoid(node)); });
-    const Solid::Closeness found = solid.closeness(cut);
-    const double percent = 100 / solid.diagonal();
-    return {found.max * percent, found.mean * percent, found.p99 * percent};
 }
 
 // How the captions are set: alike in all panels.
@@ -223,123 +150,6 @@ HalfSpace half_space(const SectionPlane& plane, const Stage& stage, const dvec3&
     out.normal[axis] = eye[axis] < offset ? -1 : 1;
     out.offset = out.normal[axis] * offset;
     return out;
-}
-
-Paint plain_paint(const Stage& stage) {
-    return [&stage, neutral = to_linear_rgb(kNeutral), inner = to_linear_rgb(kInner)](const Hit& hit, const dvec3&) {
-        return hit.id == kMeshId ? neutral : hit.id == kInnerId ? inner : stage.colours[hit.id];
-    };
-}
-
-// Of a `surface`, there is no mesh that is to be neutral.
-Paint heat_paint(const Stage& stage, bool surface = false) {
-    return [&stage, surface, neutral = to_linear_rgb(kNeutral), inner = to_linear_rgb(kInner),
-            percent = 100 / stage.solid->diagonal()](const Hit& hit, const dvec3& at) {
-        if (hit.id == kMeshId && !surface) return neutral;
-        if (hit.id == kInnerId) return inner;
-        return stage.heat->colour(stage.solid->outside_distance(at / stage.frame.scale + stage.frame.center) * percent);
-    };
-}
-
-void add_growth(Stage& stage, const TreeView& tree) {
-    node_growth(tree, stage.growth.emplace_back(tree.slot_count()));
-}
-
-// What a section shows in the cut at a level: the mesh, if there is one, and in it the inner cover at that level.
-const Scene* mesh_of(Stage& stage, const TreeView& tree, uint32_t level, bool section) {
-    const auto inner = tree.inner();
-    if (!section || !inner) return stage.mesh.get();
-    add_growth(stage, *inner);
-    stage.cuts.emplace_back(*inner, std::min(level, inner->level_count() - 1), stage.growth.back(), stage.frame);
-    return &stage.inner.emplace_back(stage.cuts.back(), stage.mesh.get());
-}
-
-PanelContent& add_panel(Stage& stage, const Scene& scene, std::string caption, const Paint& paint) {
-    Panel& panel = stage.panels.emplace_back();
-    panel.caption = std::move(caption);
-    panel.content.scene = &scene;
-    panel.content.paint = paint;
-    return panel.content;
-}
-
-std::unique_ptr<Stage> make_stage(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
-    auto stage = std::make_unique<Stage>(); // its address stays
-    Box shown;
-    for (const uint32_t level : o.levels)
-        tree.for_each_in_cut(level, [&](uint32_t node) { shown.add(tree.ellipsoid(node)); });
-    stage->box = shown;
-    const bool mesh_shown = mesh && o.mesh_style != MeshStyle::hidden;
-    if (mesh) {
-        stage->box = {};
-        stage->box.add(mesh->mesh.view());
-        if (mesh_shown) shown.add(stage->box.low, stage->box.high);
-        if (o.heat || o.section) stage->solid = std::make_unique<Solid>(mesh->mesh.view(), mesh->report.closed);
-    }
-    stage->frame = shown.frame();
-    add_growth(*stage, tree);
-    const std::vector<float>& growth = stage->growth.back();
-    if (mesh_shown) stage->mesh = std::make_unique<MeshScene>(mesh->mesh.view(), stage->frame, stage->solid.get());
-    for (const Oklch& colour : node_colours(tree)) stage->colours.push_back(to_linear_rgb(colour));
-
-    const Paint paint = o.heat ? heat_paint(*stage) : plain_paint(*stage);
-    if (mesh_shown && o.mesh_style == MeshStyle::beside)
-        add_panel(*stage, *stage->mesh, caption_of(mesh->mesh.view()), paint);
-    double most = 0;
-    for (const uint32_t level : o.levels) {
-        const CutScene& cut = stage->cuts.emplace_back(tree, level, growth, stage->frame);
-        std::string caption = caption_of(tree, level, cut.size());
-        if (o.heat) {
-            const Figures figures = figures_of(tree, level, *mesh, *stage->solid);
-            most = std::max(most, mesh->report.closed ? figures.max : figures.p99);
-            caption += words_of(figures, mesh->report.closed);
-        } else {
-            caption += ratio_of(tree, level);
-        }
-        PanelContent& content = add_panel(*stage, cut, std::move(caption), paint);
-        if (o.heat) content.relief = kHeatRelief;
-        content.see_through = o.mesh_style == MeshStyle::overlay;
-        if (content.see_through || o.section) content.mesh = mesh_of(*stage, tree, level, o.section.has_value());
-    }
-    if (o.heat) {
-        const double top = o.heat_top > 0 ? o.heat_top : HeatScale::round_up(most);
-        stage->heat = {top, !mesh->report.closed || most > top};
-    }
-    return stage;
-}
-
-// The mesh, and the leaves of each tree and each surface.
-std::unique_ptr<Stage> make_stage(std::span<const CoverPanel> covers, const CleanMesh& mesh, const SheetOptions& o) {
-    auto stage = std::make_unique<Stage>();
-    stage->solid = std::make_unique<Solid>(mesh.mesh.view(), mesh.report.closed);
-    stage->box.add(mesh.mesh.view());
-    Box shown = stage->box;
-    double most = 0;
-    std::vector<Ellipsoid> leaves;
-    const auto leaf_level = [](const CoverPanel& cover) { return cover.tree.level_count() - 1; };
-    for (const CoverPanel& cover : covers) {
-        shown.add(cover.surface);
-        if (!cover.surface.triangles.empty()) continue;
-        cover.tree.for_each_in_cut(leaf_level(cover), [&](uint32_t node) { shown.add(cover.tree.ellipsoid(node)); });
-        const LevelInfo level = cover.tree.level(leaf_level(cover));
-        most = std::max(most, 100 * (mesh.report.closed ? level.hausdorff_max : level.hausdorff_p99) /
-                                  stage->solid->diagonal());
-    }
-    stage->frame = shown.frame();
-    stage->heat = {o.heat_top > 0 ? o.heat_top : HeatScale::round_up(most), !mesh.report.closed};
-    stage->mesh = std::make_unique<MeshScene>(mesh.mesh.view(), stage->frame);
-    add_panel(*stage, *stage->mesh, caption_of(mesh.mesh.view()), heat_paint(*stage));
-    for (const CoverPanel& cover : covers) {
-        const bool surface = !cover.surface.triangles.empty();
-        const Scene* scene = nullptr;
-        if (surface) {
-            scene = &stage->surfaces.emplace_back(cover.surface, stage->frame);
-        } else {
-            add_growth(*stage, cover.tree);
-            scene = &stage->cuts.emplace_back(cover.tree, leaf_level(cover), stage->growth.back(), stage->frame);
-        }
-        add_panel(*stage, *scene, cover.caption, heat_paint(*stage, surface)).relief = kHeatRelief;
-    }
-    return stage;
 }
 
 Result<Sheet> draw(const std::unique_ptr<Stage>& stage, const SheetOptions& o) {

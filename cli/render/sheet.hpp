@@ -40,6 +40,12 @@ struct SheetOptions {
     bool floor_shadow = true;
     MeshStyle mesh_style = MeshStyle::beside;
     std::optional<SectionPlane> section;
+    /// Coordinates of a tree that deforms: beside each level at rest it is also shown at each of these. As many as it
+    /// has modes, in their ranges. Not with heat.
+    std::vector<std::vector<float>> at;
+    /// What a unit of each mode adds to each vertex of the mesh, M by V by 3, metres: it is then shown as it moves,
+    /// too.
+    std::vector<float> displacements;
     /// Colour by how far the cover sticks out of the mesh (Solid::outside_distance), with a legend and figures. Needs a
     /// mesh, and not as an overlay.
     bool heat = false;

@@ -99,14 +99,6 @@ nlohmann::ordered_json distances_of(const DistanceLattice& lattice, double diago
 
 } // namespace
 
-CleanMesh mesh_of(const TreeView& exact_tree) {
-    CleanMesh out;
-    for (uint32_t v = 0; v < exact_tree.vertex_count(); ++v) out.mesh.vertices.push_back(exact_tree.vertex(v));
-    for (uint32_t t = 0; t < exact_tree.triangle_count(); ++t) out.mesh.triangles.push_back(exact_tree.triangle(t));
-    out.report.closed = !exact_tree.surface_mode();
-    return out;
-}
-
 std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBlock& numbers, bool with_file,
                                                 const std::function<bool(double)>& progress) {
     const TreeView& tree = body.tree;

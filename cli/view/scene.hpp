@@ -28,7 +28,4 @@ struct ViewBody {
 std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBlock& numbers, bool with_file,
                                                 const std::function<bool(double)>& progress);
 
-/// The mesh that an exact tree holds.
-CleanMesh mesh_of(const TreeView& exact_tree);
-
 } // namespace prolate::cli
