@@ -126,6 +126,22 @@ Result<void> check_picture(const SheetOptions& o) {
     return {};
 }
 
+// What a tree that deforms is to be shown at.
+Result<void> check_coordinates(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
+    const auto modes = tree.deformation();
+    if (!o.at.empty() && !modes) return bad("a tree that does not deform has no coordinates", 0);
+    if (!o.at.empty() && o.heat) return bad("distances from the mesh are known at rest only", 0);
+    for (const std::vector<float>& q : o.at) {
+        if (q.size() != modes->mode_count()) return bad("there must be a coordinate for each mode", q.size());
+        for (uint32_t m = 0; m < q.size(); ++m)
+            if (!(std::abs(q[m]) <= modes->range(m))) return bad("a coordinate is out of its range", m);
+    }
+    const size_t wanted = mesh && modes ? 3 * size_t{modes->mode_count()} * mesh->mesh.vertices.size() : 0;
+    if (!o.displacements.empty() && o.displacements.size() != wanted)
+        return bad("there must be a displacement for each vertex and mode", o.displacements.size());
+    return {};
+}
+
 Result<void> check(const TreeView& tree, const CleanMesh* mesh, const SheetOptions& o) {
     if (auto checked = check_picture(o); !checked) return checked;
     if (o.levels.empty()) return bad("no level to show", 0);
@@ -138,7 +154,7 @@ Result<void> check(const TreeView& tree, const CleanMesh* mesh, const SheetOptio
     if (o.heat && o.mesh_style == MeshStyle::overlay)
         return bad("a mesh that is seen through the ellipsoids would change the colours of the heat scale", 0);
     if (o.mesh_style == MeshStyle::overlay && !mesh) return bad("there is no mesh to lay over the ellipsoids", 0);
-    return {};
+    return check_coordinates(tree, mesh, o);
 }
 
 // Of the axis' two sides, the viewer's is cut away.

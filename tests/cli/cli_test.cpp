@@ -430,8 +430,27 @@ TEST_F(Cli, BakeTakesModesFromNumpysFiles) {
     EXPECT_NE(fewer.err.find("one.npy"), std::string::npos) << fewer.err;
     EXPECT_EQ(info["mode_ranges"], (std::vector<double>{0.5, 2}));
     EXPECT_TRUE(info["unknown_sections"].empty());
+    // Pictures of it as it moves.
+    const auto render = [&](std::initializer_list<std::string> options) {
+        std::vector<std::string> words{"render", tree, mesh, "-o", file("at.png"), "--size", "300x120", "--force"};
+        words.insert(words.end(), options);
+        return run(words);
+    };
+    const std::string u_file = file("u.npy");
+    EXPECT_EQ(render({"--modes", u_file, "--mesh", "overlay", "--at", "0.5,-2", "--at", "-0.5,0"}).code, 0);
+    EXPECT_EQ(render({"--at", "0.5,-2"}).code, 0);
+    expect_failure(render({"--mesh", "overlay", "--at", "0,0"}), 2, "--mesh overlay",
+                   "how the mesh moves is not known");
+    expect_failure(render({"--at", "0.6,0"}), 2, "--at 0.6,0", "mode 1 goes from -0.5 to 0.5");
+    expect_failure(render({"--at", "nan,0"}), 2, "--at nan,0", "mode 1 goes from");
+    expect_failure(render({"--at", "0.5"}), 2, "--at 0.5", "1 coordinate for 2 modes");
+    expect_failure(render({"--at", "0.5,"}), 2, "--at 0.5,", "not numbers");
+    expect_failure(render({"--heat", "--at", "0,0"}), 2, "--heat", "at rest");
+    EXPECT_EQ(run({"view", tree, mesh, "--modes", u_file, "-o", file("page.html")}).code, 0);
+    expect_failure(run({"view", tree, "--modes", u_file, "-o", file("page.html")}), 2, "--modes", "there is no mesh");
     // The same options without modes are another file.
     EXPECT_EQ(run({"bake", mesh, "-o", tree, "--ellipsoids", "1", "--quality", "fast"}).code, 0);
+    expect_failure(render({"--at", "0,0"}), 2, "--at 0,0", "the tree does not deform");
     EXPECT_TRUE(Json::parse(run({"info", tree, "--json"}).out)["mode_ranges"].empty());
     expect_failure(run({"verify", tree, mesh, "--modes", file("u.npy")}), 2, file("u.npy"), "does not deform");
 

@@ -5,9 +5,11 @@
 #include "cli/render/panel.hpp"
 #include "cli/render/scene_cut.hpp"
 #include "cli/render/scene_mesh.hpp"
+#include "cli/render/scene_moved.hpp"
 #include "cli/render/sheet.hpp"
 #include "cli/render/solid.hpp"
 #include "src/format.hpp"
+#include "tests/query/deform/moving_bodies.hpp"
 
 #include <prolate/tools.hpp>
 
@@ -599,6 +601,72 @@ TEST(Render, HeatTellsTheDistance) {
         EXPECT_GT(right, 3000);
         EXPECT_LT(wrong, right / 50);
     }
+}
+
+// A body that deforms: its cuts hold the mesh as it moves, and rays meet them where they begin.
+TEST(Render, MovedScenesHoldTheMesh) {
+    const moving::Moving& body = moving::torus();
+    const TreeView tree = moving::torus_cover().view();
+    scenes::Random random(7);
+    for (uint32_t level = 0; level < tree.level_count(); ++level)
+        for (int round = 0; round < 4; ++round) {
+            const std::vector<float> q = body.random_q(random);
+            Box box;
+            tree.for_each_in_cut(level, [&](uint32_t node) { box.add(moved_ellipsoid(tree, node, q)); });
+            const Frame frame = box.frame();
+            const MovedScene scene(tree, level, q, frame);
+            const Camera camera = make_camera({});
+            const Window window = scene.window(camera);
+            for (uint32_t v = 0; v < body.mesh.vertices.size(); v += 7) {
+                const moving::Point moved = body.moved(v, q);
+                const dvec3 p = (dvec3(moved[0], moved[1], moved[2]) - frame.center) * frame.scale;
+                EXPECT_NE(scene.place_of(p).id, kNothing);
+                const dvec3 towards = glm::normalize(p - camera.eye);
+                const double depth = glm::dot(towards, camera.forward);
+                EXPECT_GT(glm::dot(towards, camera.right) / depth, window.u0);
+                EXPECT_LT(glm::dot(towards, camera.right) / depth, window.u1);
+                EXPECT_LT(glm::dot(camera.up, p), scene.extent(camera.up));
+                const Hit hit = scene.first_hit(camera.eye, towards, {});
+                ASSERT_NE(hit.id, kNothing);
+                EXPECT_LT(hit.distance, glm::distance(p, camera.eye));
+                EXPECT_LE(glm::dot(hit.normal, towards), 0);
+                EXPECT_EQ(scene.place_of(camera.eye + (hit.distance - 1e-6) * towards).id, kNothing);
+                EXPECT_NE(scene.place_of(camera.eye + (hit.distance + 1e-6) * towards).id, kNothing);
+                EXPECT_TRUE(scene.blocked(camera.eye, towards, {}));
+                EXPECT_FALSE(scene.blocked(camera.eye, towards, {0, hit.distance - 1e-6}));
+            }
+        }
+}
+
+TEST(Render, SheetsShowBodiesAsTheyMove) {
+    const moving::Moving& body = moving::torus();
+    const TreeView tree = moving::torus_cover().view();
+    const CleanMesh mesh = cleaned(body.mesh);
+    SheetOptions o = small_sheet();
+    o.levels = {tree.level_count() - 1};
+    o.mesh_style = MeshStyle::overlay;
+    const std::vector<float> most = body.ranges;
+    o.at = {most};
+    const auto without = render_sheet(tree, &mesh, o);
+    ASSERT_TRUE(without) << without.error().what;
+    o.displacements = body.displacements; // cleaning has moved no vertex of this mesh
+    ASSERT_EQ(mesh.mesh.vertices.size(), body.mesh.vertices.size());
+    const auto with = render_sheet(tree, &mesh, o);
+    ASSERT_TRUE(with) << with.error().what;
+    EXPECT_NE(without->rgb, with->rgb);
+    const auto code = [&](auto&& change) {
+        SheetOptions changed = o;
+        change(changed);
+        const auto sheet = render_sheet(tree, &mesh, changed);
+        return sheet ? ErrorCode{} : sheet.error().code;
+    };
+    EXPECT_EQ(code([](SheetOptions& c) { c.at[0].pop_back(); }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& c) { c.at[0][1] *= 1.01f; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& c) { c.at[0][1] = NAN; }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& c) { c.displacements.pop_back(); }), ErrorCode::bad_options);
+    EXPECT_EQ(code([](SheetOptions& c) { c.heat = true, c.mesh_style = MeshStyle::beside; }), ErrorCode::bad_options);
+    o.displacements.clear(), o.mesh_style = MeshStyle::hidden;
+    EXPECT_EQ(render_sheet(nested_circles(3).view(), nullptr, o).error().code, ErrorCode::bad_options);
 }
 
 // Nothing may be cut off: the outermost pixels are paper, whatever the shape and the view.
