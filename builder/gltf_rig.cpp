@@ -17,6 +17,21 @@ std::string name_of(const GltfValue& value, const std::string& otherwise) {
     return value.has("name") ? value["name"].text() : otherwise;
 }
 
+// Where the inverse of a matrix, column by column, takes (0, 0, 0).
+Vec3 origin_of_inverse(const double* m) {
+    const auto cofactor = [m](size_t i, size_t k) { // of entry (k, i): this is entry (i, k) of the adjugate
+        const size_t r = (k + 1) % 3, s = (k + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+        return m[4 * c + r] * m[4 * d + s] - m[4 * d + r] * m[4 * c + s];
+    };
+    const double determinant = m[0] * cofactor(0, 0) + m[4] * cofactor(1, 0) + m[8] * cofactor(2, 0);
+    double out[3];
+    for (size_t i = 0; i < 3; ++i)
+        out[i] = -(cofactor(i, 0) * m[12] + cofactor(i, 1) * m[13] + cofactor(i, 2) * m[14]) / determinant;
+    const bool sound = std::all_of(out, out + 3, [](double x) { return std::abs(x) <= double{kLargestCoordinate}; });
+    if (!sound) return {}; // a matrix without an inverse says nothing of its joint
+    return {static_cast<float>(out[0]), static_cast<float>(out[1]), static_cast<float>(out[2])};
+}
+
 } // namespace
 
 void GltfRig::begin(const GltfValue& node, const GltfValue& mesh) {
@@ -36,11 +51,35 @@ void GltfRig::begin_skin(const GltfValue& index) {
     if (out_.bones.size() + joints.size() > kMaxBones) joints.fail("more than 1024 joints");
     for (uint64_t i = 0; i < joints.size(); ++i)
         out_.bones.push_back(name_of(document_.named("nodes", joints.element(i)), "joint " + std::to_string(i)));
+    add_parents(joints);
+    out_.joints.resize(out_.bones.size()); // where there are no matrices, they are the identity
     if (!skin.has("inverseBindMatrices")) return;
     const std::vector<double> bind = document_.rows(skin["inverseBindMatrices"], Rows::mat4);
     if (bind.size() / 16 < joints.size()) skin["inverseBindMatrices"].fail("fewer matrices than joints");
     if (!std::all_of(bind.begin(), bind.end(), [](double x) { return std::isfinite(x); }))
         skin["inverseBindMatrices"].fail("a matrix that is not finite");
+    for (size_t i = 0; i < joints.size(); ++i) out_.joints[first_bone_ + i] = origin_of_inverse(&bind[16 * i]);
+}
+
+void GltfRig::add_parents(const GltfValue& joints) {
+    const GltfValue nodes = document_.root()["nodes"];
+    std::vector<uint64_t> above(nodes.size(), nodes.size()); // of each node; of a root none
+    for (uint64_t n = 0; n < nodes.size(); ++n)
+        if (const GltfValue node = nodes.element(n); node.has("children"))
+            for (uint64_t c = 0; c < node["children"].size(); ++c)
+                if (const uint64_t child = node["children"].element(c).whole(); child < nodes.size()) above[child] = n;
+    std::map<uint64_t, uint32_t> bones;
+    for (uint64_t i = 0; i < joints.size(); ++i)
+        bones.emplace(joints.element(i).whole(), first_bone_ + static_cast<uint32_t>(i));
+    for (uint64_t i = 0; i < joints.size(); ++i) {
+        const uint32_t own = first_bone_ + static_cast<uint32_t>(i);
+        uint64_t at = above[joints.element(i).whole()];
+        // No more steps than there are nodes: what is above may be a circle.
+        for (uint64_t steps = 0; at < nodes.size() && !bones.contains(at) && steps < nodes.size(); ++steps)
+            at = above[at];
+        const auto parent = at < nodes.size() ? bones.find(at) : bones.end();
+        out_.parents.push_back(parent == bones.end() ? own : parent->second);
+    }
 }
 
 // Modes of the mesh's targets; all its primitives have as many.

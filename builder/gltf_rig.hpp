@@ -16,7 +16,7 @@ namespace prolate {
 
 class GltfRig {
 public:
-    /// Fills in all of `out` but the mesh; displacements are in the file's coordinates.
+    /// Fills in all of `out` but the mesh; displacements and joints are in the file's coordinates.
     GltfRig(GltfDocument& document, RiggedMesh& out) : document_(document), out_(out) {}
 
     /// The parts to come are those of this node's mesh.
@@ -35,6 +35,7 @@ private:
     };
 
     void begin_skin(const GltfValue& skin);
+    void add_parents(const GltfValue& joints);
     void begin_morphs(const GltfValue& node, const GltfValue& mesh);
     void add_weights(const GltfValue& primitive, size_t first, size_t count);
     void add_targets(const GltfValue& primitive, size_t first, size_t count, const Affine& transform);

@@ -317,6 +317,10 @@ Result<RiggedMesh> load_rigged_mesh(const char* path, const ImportOptions& optio
     out.mesh = std::move(*mesh);
     for (size_t i = 0; i < out.displacements.size(); ++i)
         out.displacements[i] = static_cast<float>(out.displacements[i] * out.mesh.placement.scale[i % 3]);
+    const auto& [scale, origin] = out.mesh.placement;
+    for (Vec3& joint : out.joints)
+        joint = {static_cast<float>(joint.x * scale[0] - origin[0]), static_cast<float>(joint.y * scale[1] - origin[1]),
+                 static_cast<float>(joint.z * scale[2] - origin[2])};
     return out;
 }
 

@@ -15,6 +15,26 @@ std::array<float, 3> place_of(const Vec3& v) {
 
 } // namespace
 
+std::vector<uint32_t> sources_of(const Mesh& as_read, const std::vector<Vec3>& vertices) {
+    std::map<std::array<float, 3>, uint32_t> source;
+    for (const Triangle& t : as_read.triangles)
+        for (const uint32_t corner : t) source.emplace(place_of(as_read.vertices[corner]), corner);
+    std::vector<uint32_t> out;
+    for (const Vec3& v : vertices) out.push_back(source.at(place_of(v)));
+    return out;
+}
+
+std::vector<float> displacements_at(const std::vector<uint32_t>& sources, const Modes& modes) {
+    const size_t of_mode = modes.displacements.size() / modes.ranges.size();
+    std::vector<float> out;
+    for (size_t m = 0; m < modes.ranges.size(); ++m)
+        for (const uint32_t vertex : sources) {
+            const float* u = &modes.displacements[m * of_mode + 3 * size_t{vertex}];
+            out.insert(out.end(), u, u + 3);
+        }
+    return out;
+}
+
 std::vector<float> displacements_of(const TreeView& exact_tree) {
     std::vector<float> out;
     const Deformation modes = *exact_tree.deformation();
@@ -47,18 +67,7 @@ Outcome<std::vector<float>> displacements_of(const TreeView& tree, const Mesh& a
         return Failure{kBadInput, modes_path,
                        fmt::format("mode {} is not one that the tree was baked with", known->proof.mode + 1),
                        "give the file that bake had"};
-    const std::vector<float>& read = known->file.displacements;
-    // All that are in one place move alike: the proof has seen to it.
-    std::map<std::array<float, 3>, size_t> source;
-    for (const Triangle& t : as_read.triangles)
-        for (const uint32_t corner : t) source.emplace(place_of(as_read.vertices[corner]), corner);
-    std::vector<float> out;
-    for (size_t m = 0; m < known->file.ranges.size(); ++m)
-        for (const Vec3& v : vertices) {
-            const float* u = &read[3 * (m * as_read.vertices.size() + source.at(place_of(v)))];
-            out.insert(out.end(), u, u + 3);
-        }
-    return out;
+    return displacements_at(sources_of(as_read, vertices), known->file.view());
 }
 
 } // namespace prolate::cli

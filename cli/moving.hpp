@@ -22,6 +22,12 @@ struct ProvedModes {
 };
 Outcome<ProvedModes> prove_modes(const TreeView& tree, const Mesh& as_read, const std::string& modes_path);
 
+/// For each of `vertices`, which lie where some of `as_read` lie that triangles use, the number of one of these.
+std::vector<uint32_t> sources_of(const Mesh& as_read, const std::vector<Vec3>& vertices);
+
+/// Displacements, M by V by 3, of other vertices: those of the sources.
+std::vector<float> displacements_at(const std::vector<uint32_t>& sources, const Modes& modes);
+
 /// What a unit of each mode adds to each vertex of an exact tree that deforms: M by V by 3, metres.
 std::vector<float> displacements_of(const TreeView& exact_tree);
 

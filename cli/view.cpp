@@ -35,6 +35,7 @@ If a tree has an inner cover (bake --inner), the page begins with both covers cu
 
 If a tree deforms (bake --modes), the page has a slider for each of its modes, and plays them. The ellipsoids move and
 grow as queries take them; the mesh moves with them if --modes names the file that bake had, or if the tree is exact.
+If bones move it (bake --skin), the glTF after it brings a slider for each bone, which turns about its joint.
 
 With two trees, you can drag one body against the other. The verdict, the distance, the nearest points and the
 counts come from prolate's own runtime, compiled to WebAssembly; this needs a command that was built where
@@ -153,7 +154,8 @@ Outcome<ExitCode> run(ViewArguments& a) {
         if (const auto read = read_asset(asset, a.mesh_options, first ? a.modes : ""); !read) return read.error();
         ProgressLine line;
         auto body = view_body({name_of(asset.tree_path), name_of(asset.mesh_path), asset.tree->view(),
-                               std::move(asset.shown.mesh), asset.shown.own, std::move(asset.shown.displacements)},
+                               std::move(asset.shown.mesh), asset.shown.own, std::move(asset.shown.displacements),
+                               std::move(asset.shown.skin)},
                               numbers, two, [&line](double fraction) { return line.show("measuring", fraction); });
         if (!body) return failure_of("view", Error{ErrorCode::cancelled});
         scene["bodies"].push_back(std::move(*body));

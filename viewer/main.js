@@ -44,6 +44,7 @@ class App {
       sectionAt: 0.5,
       coordinates: scene.bodies[0].coordinates,
       playing: false,
+      boneAxis: 2,
       drag: 'move',
       hover: 0,
     });
@@ -65,7 +66,8 @@ class App {
       leave: () => this.hover.hide(),
     });
     if (this.deforms)
-      this.player = new Player(scene.bodies[0].deformation.ranges, (coordinates) => this.state.set({coordinates}));
+      this.player = new Player(
+          scene.bodies[0].deformation, () => this.state.boneAxis, (coordinates) => this.state.set({coordinates}));
     this.panel = new Panel(this);
     const groups = shortcuts(this);
     fillSheet(element('help-groups'), groups);

@@ -54,19 +54,25 @@ export class Panel {
         kind(bodies[0]) + (bodies[0].mesh ? ` · ${grouped(bodies[0].mesh.triangles.length / 3)} triangles` : '');
   }
 
-  // A slider for each mode, over its range.
+  // A slider for each mode, over its range, and for each bone.
   modes() {
-    const {app} = this, {deformation} = app.scene.bodies[0];
+    const {app} = this, {ranges, skin} = app.scene.bodies[0].deformation;
     element('deformation').hidden = false;
-    element('modes').append(...Array.from(deformation.ranges, (range, m) => {
+    element('bone-axis').hidden = !skin;
+    this.moves = [
+      ...Array.from(ranges, (range, m) => ({name: `mode ${m + 1}`, range, at: () => m})),
+      ...Array.from(
+          skin?.bones ?? [], (name, b) => ({name, range: 1.5, at: () => ranges.length + 3 * b + app.state.boneAxis})),
+    ];
+    element('modes').append(...this.moves.map(({name, range, at}, i) => {
       const row = document.createElement('div'), label = document.createElement('label'),
             input = document.createElement('input'), text = document.createElement('output');
       row.className = 'row';
-      Object.assign(label, {htmlFor: `mode-${m}`, textContent: `mode ${m + 1}`});
-      Object.assign(input, {id: `mode-${m}`, type: 'range', min: -range, max: range, step: range / 100, value: 0});
+      Object.assign(label, {htmlFor: `mode-${i}`, textContent: name, title: name});
+      Object.assign(input, {id: `mode-${i}`, type: 'range', min: -range, max: range, step: range / 100, value: 0});
       input.addEventListener('input', () => {
-        const at = Math.abs(input.valueAsNumber) < range / 200 ? 0 : input.valueAsNumber;
-        app.deform(app.state.coordinates.map((x, i) => (i === m ? at : x)));
+        const value = Math.abs(input.valueAsNumber) < range / 200 ? 0 : input.valueAsNumber, place = at();
+        app.deform(app.state.coordinates.map((x, k) => (k === place ? value : x)));
       });
       row.append(label, input, text);
       return row;
@@ -140,12 +146,14 @@ export class Panel {
 
   refreshModes() {
     const {state, scene} = this.app, [{moved, mesh, showsMesh, levels}] = scene.bodies;
-    [...element('modes').children].forEach((row, m) => {
-      row.children[1].value = state.coordinates[m];
-      row.children[2].textContent = short(state.coordinates[m], 3);
+    const modes = scene.bodies[0].deformation.ranges.length;
+    [...element('modes').children].forEach((row, i) => {
+      const value = state.coordinates[this.moves[i].at()];
+      row.children[1].value = value;
+      row.children[2].textContent = i < modes ? short(value, 3) : `${Math.round(180 / Math.PI * value)}°`;
     });
     element('play').textContent = state.playing ? 'pause' : 'play';
-    const words = ['Each ellipsoid holds its part of the mesh at all coordinates within these ranges.'];
+    const words = ['Each ellipsoid holds its part of the mesh, wherever these move it.'];
     if (moved && state.level < levels.length - 1) words.push('Above the last level they hold all leaves below, too.');
     if (moved && mesh && !showsMesh) words.push('To see the mesh move, name its modes: view --modes.');
     if (moved && state.colour === 'outside') words.push('Distances are known at rest only.');

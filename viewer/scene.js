@@ -1,5 +1,5 @@
 // The scene that `prolate view` has put into the page: a description in JSON, and a block of numbers that it refers to.
-import {movedEllipsoids, movedVertices} from './deformation.js';
+import {knowsVertices, movedEllipsoids, movedVertices, posesRanges} from './deformation.js';
 import {element} from './dom.js';
 import {add, clamp, directionToBody, dot, ends, kIdentity, scaled, subtract, toWorld} from './vector.js';
 
@@ -45,19 +45,19 @@ class Body {
     this.version = 0; // another one for each change of shape
     // What the camera looks at: all but the root, which by far sticks out the most; and what it must not cut off.
     const rows = Array.from(this.nodes.slot.keys());
-    this.deform(Array.from(this.deformation?.ranges ?? [], () => 0));
+    this.deform(this.deformation ? posesRanges(this.deformation).map(() => 0) : []);
     this.box = this.boxOf(rows.length > 1 ? rows.slice(1) : rows);
   }
 
-  /// Moves the body by its modes: what `ellipsoid` and `vertices` hold from now on. At rest, ellipsoids are those of
+  /// Moves the body by its modes and bones: what `ellipsoid` and `vertices` hold from now on. At rest, ellipsoids are those of
   /// the levels; else the bounds, which queries of deforming bodies ask.
-  deform(q) {
-    const {deformation, mesh, nodes} = this, displacements = deformation?.displacements;
-    this.coordinates = q;
-    this.moved = q.some((x) => x !== 0);
-    this.ellipsoid = this.moved ? movedEllipsoids(deformation, q, nodes.slot.keys()) : nodes.ellipsoid;
-    this.vertices = this.moved && displacements ? movedVertices(mesh.vertices, displacements, q) : mesh?.vertices;
-    this.showsMesh = Boolean(mesh && (!this.moved || displacements));
+  deform(pose) {
+    const {deformation, mesh, nodes} = this;
+    this.coordinates = pose;
+    this.moved = pose.some((x) => x !== 0);
+    this.ellipsoid = this.moved ? movedEllipsoids(deformation, pose, nodes.slot.keys()) : nodes.ellipsoid;
+    this.showsMesh = Boolean(mesh && (!this.moved || knowsVertices(deformation, pose)));
+    this.vertices = this.moved && this.showsMesh ? movedVertices(mesh.vertices, deformation, pose) : mesh?.vertices;
     this.reach = this.boxOf(Array.from(nodes.slot.keys()));
     ++this.version;
   }
@@ -118,7 +118,7 @@ class Body {
     const level = this.levels.findLastIndex((one) => one.cut <= 64),
           few = deformation ? this.cut(Math.max(1, level)) : [];
     for (const end of few.length > 0 ? [-1, 1] : [])
-      for (let m = 0; m < coordinates.length; ++m) {
+      for (let m = 0; m < deformation.ranges.length; ++m) {
         const q = coordinates.map((_, i) => (i === m ? end * deformation.ranges[m] : 0));
         out.push(...this.extentsOf(movedEllipsoids(deformation, q, few), few, direction));
       }

@@ -71,19 +71,49 @@ std::vector<float> to_floats(const std::vector<double>& values) {
 }
 
 // How the nodes move (viewer/deformation.js), in the order of nodes_of().
-nlohmann::ordered_json deformation_of(const TreeView& tree, const Deformation& modes, NumberBlock& numbers) {
+nlohmann::ordered_json deformation_of(const TreeView& tree, NumberBlock& numbers) {
     std::vector<float> ranges, bound, motions;
-    for (uint32_t m = 0; m < modes.mode_count(); ++m) ranges.push_back(modes.range(m));
+    const auto modes = tree.deformation();
+    const uint32_t count = modes ? modes->mode_count() : 0;
+    for (uint32_t m = 0; m < count; ++m) ranges.push_back(modes->range(m));
     for (uint32_t l = 0; l < tree.level_count(); ++l)
         tree.for_each_node(l, [&](uint32_t node) {
             append(bound, tree.bound(node));
-            for (uint32_t m = 0; m < modes.mode_count(); ++m) {
-                const Deformation::Motion motion = modes.motion(node, m);
+            for (uint32_t m = 0; m < count; ++m) {
+                const Deformation::Motion motion = modes->motion(node, m);
                 for (const double x : {motion.shift[0], motion.shift[1], motion.shift[2], motion.growth, motion.radius})
                     motions.push_back(static_cast<float>(x));
             }
         });
     return {{"ranges", numbers.add(ranges)}, {"bound", numbers.add(bound)}, {"motions", numbers.add(motions)}};
+}
+
+// How bones move them (viewer/skinning.js), and the mesh.
+nlohmann::ordered_json skin_of(const TreeView& tree, const ShownSkin& shown, NumberBlock& numbers) {
+    const Skin skin = *tree.skin();
+    std::vector<uint32_t> first = {0};
+    std::vector<uint16_t> bones;
+    std::vector<float> influences, joints;
+    for (uint32_t l = 0; l < tree.level_count(); ++l)
+        tree.for_each_node(l, [&](uint32_t node) {
+            for (uint32_t i = 0; i < skin.influence_count(node); ++i) {
+                const Skin::Influence of = skin.influence(node, i);
+                bones.push_back(static_cast<uint16_t>(of.bone));
+                for (const double x : {of.weight, of.spread, of.center[0], of.center[1], of.center[2], of.radius})
+                    influences.push_back(static_cast<float>(x));
+            }
+            first.push_back(static_cast<uint32_t>(bones.size()));
+        });
+    for (const Vec3& joint : shown.joints) joints.insert(joints.end(), {joint.x, joint.y, joint.z});
+    return {{"bones", shown.bones},
+            {"parents", shown.parents},
+            {"joints", numbers.add(joints)},
+            {"first", numbers.add(first)},
+            {"influence_bones", numbers.add(bones)},
+            {"influences", numbers.add(influences)},
+            {"each", shown.each},
+            {"indices", numbers.add(shown.indices)},
+            {"weights", numbers.add(shown.weights)}};
 }
 
 // Half floats, in percent of the diagonal: 0.05 % of each value is as good as a picture gets.
@@ -125,8 +155,9 @@ std::optional<nlohmann::ordered_json> view_body(const ViewBody& body, NumberBloc
             out["inner"]["cuts"].push_back({{"nodes", cut_size(*inner, l)},
                                             {"share", inner->level(l).union_volume / inner->bake_info().solid_volume}});
     }
-    if (const auto modes = tree.deformation()) {
-        out["deformation"] = deformation_of(tree, *modes, numbers);
+    if (tree.deformation() || body.skin) {
+        out["deformation"] = deformation_of(tree, numbers);
+        if (body.skin) out["deformation"]["skin"] = skin_of(tree, *body.skin, numbers);
         if (!body.displacements.empty()) out["deformation"]["displacements"] = numbers.add(body.displacements);
     }
     if (body.mesh) {

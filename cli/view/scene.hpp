@@ -1,6 +1,7 @@
 // What the viewer's page is told: bodies, levels, nodes, meshes, colours. viewer/scene.js reads it.
 #pragma once
 
+#include "cli/shown_mesh.hpp"
 #include "cli/view/page.hpp"
 
 #include <prolate/mesh.hpp>
@@ -21,6 +22,7 @@ struct ViewBody {
     bool own_mesh = true; ///< the mesh is the one that the tree was baked from
     /// What a unit of each mode adds to each vertex of `mesh`, M by V by 3, metres; empty if that is not known.
     std::vector<float> displacements = {};
+    std::optional<ShownSkin> skin = {};
 };
 
 /// Describes one body, and puts its numbers into `numbers`. `with_file`: the bytes of the tree too, for queries.

@@ -53,6 +53,8 @@ Result<SkinProof> verify_skin(const TreeView& tree, MeshView mesh, const BoneWei
 struct RiggedMesh {
     Mesh mesh;
     std::vector<std::string> bones; ///< names of the joints, by number; none if the file has no skin
+    std::vector<uint32_t> parents;  ///< the bone of the nearest joint above each one's, or itself if there is none
+    std::vector<Vec3> joints;       ///< where each joint is in the bind pose, metres
     uint32_t weights_each = 0;
     std::vector<uint16_t> indices;
     std::vector<float> weights;

@@ -1,4 +1,6 @@
 """What the tests of pages share: meshes, the command, a window, and looks at it."""
+import base64
+import json
 import math
 import os
 import struct
@@ -56,6 +58,50 @@ def vertices(mesh):
     return [tuple(map(float, line.split()[1:])) for line in mesh.splitlines() if line.startswith("v ")]
 
 
+def rigged_bar(rings=13):
+    """A glTF of a closed square bar along y, 0 ... 3, and three joints in it, each one's end above the last."""
+    at, joints, weights, triangles = [], [], [], []
+    for ring in range(rings):
+        y = 3 * ring / (rings - 1)
+        for x, z in ((-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)):
+            at.append((x, y, z))
+            upper = max(0.0, min(2.0, y - 0.5))  # blends around y = 1 and 2
+            bone, share = (0, upper) if upper < 1 else (1, upper - 1)
+            joints.append((bone, bone + 1, 0, 0))
+            weights.append((1 - share, share, 0, 0))
+    quads = [(0, 1, 2, 3), (4 * rings - 1, 4 * rings - 2, 4 * rings - 3, 4 * rings - 4)]
+    for ring in range(rings - 1):
+        for side in range(4):
+            a, b = 4 * ring + side, 4 * ring + (side + 1) % 4
+            quads.append((a, a + 4, b + 4, b))
+    for a, b, c, d in quads:
+        triangles += [a, b, c, a, c, d]
+    inverse_bind = [(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -y, 0, 1) for y in (0, 1, 2)]
+    blocks = [struct.pack(f"<{3 * len(at)}f", *sum(at, ())), struct.pack(f"<{4 * len(at)}H", *sum(joints, ())),
+              struct.pack(f"<{4 * len(at)}f", *sum(weights, ())), struct.pack(f"<{len(triangles)}I", *triangles),
+              struct.pack("<48f", *sum(inverse_bind, ()))]
+    views, offset = [], 0
+    for block in blocks:
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(block)})
+        offset += len(block)
+    kinds = [(5126, len(at), "VEC3"), (5123, len(at), "VEC4"), (5126, len(at), "VEC4"), (5125, len(triangles), "SCALAR"),
+             (5126, 3, "MAT4")]
+    accessors = [{"bufferView": i, "componentType": kind, "count": count, "type": words}
+                 for i, (kind, count, words) in enumerate(kinds)]
+    accessors[0].update(min=[min(axis) for axis in zip(*at)], max=[max(axis) for axis in zip(*at)])
+    names = ("root", "elbow", "wrist")
+    return json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"mesh": 0, "skin": 0}, {"name": "root", "children": [2]},
+                  {"name": "elbow", "translation": [0, 1, 0], "children": [3]},
+                  {"name": "wrist", "translation": [0, 1, 0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}, "indices": 3}]}],
+        "skins": [{"joints": [1, 2, 3], "inverseBindMatrices": 4}],
+        "buffers": [{"byteLength": offset,
+                     "uri": "data:application/octet-stream;base64," + base64.b64encode(b"".join(blocks)).decode()}],
+        "bufferViews": views, "accessors": accessors}), names
+
+
 def run(*arguments):
     subprocess.run([PROLATE, *arguments], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -64,11 +110,11 @@ def path(name):
     return os.path.join(FOLDER, name)
 
 
-def bake(name, mesh, *options):
+def bake(name, mesh, *options, kind="obj"):
     """A mesh and its tree."""
-    with open(path(name + ".obj"), "w", encoding="utf-8") as file:
+    with open(path(f"{name}.{kind}"), "w", encoding="utf-8") as file:
         file.write(mesh)
-    run("bake", path(name + ".obj"), "-o", path(name + ".etree"), "--quality", "fast", *options)
+    run("bake", path(f"{name}.{kind}"), "-o", path(name + ".etree"), "--quality", "fast", *options)
 
 
 class PageTest(unittest.TestCase):

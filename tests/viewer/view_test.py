@@ -2,10 +2,11 @@
 
     view_test.py PROLATE FOLDER [--screenshots] [TEST...]      exits with 77 if no browser is installed
 """
+import math
 import os
 import re
 
-from page_test import PageTest, bake, boxes, bumpy, main, path, run, vertices, write_modes
+from page_test import PageTest, bake, boxes, bumpy, main, path, rigged_bar, run, vertices, write_modes
 
 
 class OneTree(PageTest):
@@ -280,6 +281,50 @@ class DeformingCover(Deforming):
 
     def test_sections_are_filled(self):
         self.skipTest("the mesh is not shown")
+
+
+class Bones(PageTest):
+    """A bar of three bones: ellipsoids hold the mesh however they turn, and bones take those below along."""
+    page = "bones.html"
+    options = ("--ellipsoids", "16")
+
+    @classmethod
+    def setUpClass(cls):
+        mesh, cls.names = rigged_bar()
+        bake("bones", mesh, "--skin", *cls.options, kind="gltf")
+        run("view", path("bones.etree"), path("bones.gltf"), "-o", path(cls.page))
+
+    deform = Deforming.deform
+
+    def test_the_cover_holds_the_mesh(self):
+        for angles in ((0,) * 9, (0, 0, 0.4, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 0, 1.2, 0, 0, 0),
+                       (0.1, 0.2, 0.3, 0.5, -0.9, 0.4, -1.5, 0.2, 1)):
+            self.deform(*angles)
+            self.assertLess(self.js(Deforming.farthest), 1 + 1e-5, angles)
+
+    def test_bones_turn_about_joints_and_take_others_along(self):
+        self.assertEqual(self.js("[...document.querySelectorAll('#modes label')].map((label) => label.textContent)"),
+                         list(self.names))
+        rest = self.js("Array.from(viewer.scene.bodies[0].vertices)")
+        self.set_slider("mode-1", 0.9)  # the elbow, about z
+        bent = self.js("Array.from(viewer.scene.bodies[0].vertices)")
+        for v in range(0, len(rest), 3):
+            x, y, z = rest[v:v + 3]
+            if y < 0.5:  # of the root alone
+                self.assertEqual(bent[v:v + 3], rest[v:v + 3])
+            elif y > 2.5:  # of the wrist alone
+                turned = (x * math.cos(0.9) - (y - 1) * math.sin(0.9), 1 + x * math.sin(0.9) + (y - 1) * math.cos(0.9), z)
+                for value, wanted in zip(bent[v:v + 3], turned):
+                    self.assertAlmostEqual(value, wanted, places=5)
+        self.browser.keys("q", "a")
+        self.browser.wait_for("viewer.state.playing && viewer.state.coordinates[2] !== 0")
+        self.browser.keys("q")
+        self.assertFalse(self.js("viewer.scene.bodies[0].moved"))
+
+
+class BonesOfExactTrees(Bones):
+    page = "bones_exact.html"
+    options = ("--exact",)
 
 
 class Figures(PageTest):
