@@ -84,8 +84,8 @@ def rigged_bar(rings=13):
     for block in blocks:
         views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(block)})
         offset += len(block)
-    kinds = [(5126, len(at), "VEC3"), (5123, len(at), "VEC4"), (5126, len(at), "VEC4"), (5125, len(triangles), "SCALAR"),
-             (5126, 3, "MAT4")]
+    kinds = [(5126, len(at), "VEC3"), (5123, len(at), "VEC4"), (5126, len(at), "VEC4"),
+             (5125, len(triangles), "SCALAR"), (5126, 3, "MAT4")]
     accessors = [{"bufferView": i, "componentType": kind, "count": count, "type": words}
                  for i, (kind, count, words) in enumerate(kinds)]
     accessors[0].update(min=[min(axis) for axis in zip(*at)], max=[max(axis) for axis in zip(*at)])

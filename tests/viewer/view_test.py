@@ -202,7 +202,8 @@ class Deforming(PageTest):
     def setUpClass(cls):
         mesh = bumpy(24, 12)
         at = vertices(mesh)
-        write_modes("modes.npy", [[(0, 0.4 * x * x, 0) for x, _, _ in at], [(0.2 * x, -0.1 * y, z * z) for x, y, z in at]])
+        write_modes("modes.npy", [[(0, 0.4 * x * x, 0) for x, _, _ in at],
+                                  [(0.2 * x, -0.1 * y, z * z) for x, y, z in at]])
         bake("deforming", mesh, "--modes", path("modes.npy"), "--range", "0.5,0.3", *cls.options)
         run("view", path("deforming.etree"), path("deforming.obj"), "--modes", path("modes.npy"), "-o", path(cls.page))
 
@@ -313,7 +314,8 @@ class Bones(PageTest):
             if y < 0.5:  # of the root alone
                 self.assertEqual(bent[v:v + 3], rest[v:v + 3])
             elif y > 2.5:  # of the wrist alone
-                turned = (x * math.cos(0.9) - (y - 1) * math.sin(0.9), 1 + x * math.sin(0.9) + (y - 1) * math.cos(0.9), z)
+                turned = (x * math.cos(0.9) - (y - 1) * math.sin(0.9),
+                          1 + x * math.sin(0.9) + (y - 1) * math.cos(0.9), z)
                 for value, wanted in zip(bent[v:v + 3], turned):
                     self.assertAlmostEqual(value, wanted, places=5)
         self.browser.keys("q", "a")
