@@ -747,8 +747,9 @@ std::string rigged_tetrahedron(const std::vector<float>& weights, const std::str
                  w = g.accessor(g.view(weights), 5126, 4, "VEC4");
     const size_t up = g.accessor(g.view(std::vector<float>{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.5f}), 5126, 4, "VEC3"),
                  in = g.accessor(g.view(std::vector<float>{0, 0, 0, -1, 0, 0, 0, 0, 0, 0, 0, 0}), 5126, 4, "VEC3");
-    std::vector<float> bind(32);
-    for (size_t i = 0; i < 4; ++i) bind[5 * i] = bind[16 + 5 * i] = 1;
+    // The second joint is turned, and its origin is at (-0.25, 0.5, 1).
+    const std::vector<float> bind = {1, 0, 0, 0, 0,  1, 0, 0, 0, 0, 1, 0, 0,    0,     0,  1,
+                                     0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0.5f, 0.25f, -1, 1};
     const size_t m = g.accessor(g.view(bind), 5126, 2, "MAT4");
     const auto n = [](size_t x) { return std::to_string(x); };
     return g.file(
@@ -767,6 +768,8 @@ TEST_F(Import, SkinsAndMorphTargetsOfGltf) {
     const auto rigged = load_rigged_mesh(path.c_str(), {.unit = 2, .scale = {1, 1, -1}});
     ASSERT_TRUE(rigged) << rigged.error().what;
     EXPECT_EQ(rigged->bones, (std::vector<std::string>{"hip", "knee"}));
+    EXPECT_EQ(rigged->parents, (std::vector<uint32_t>{0, 0}));
+    EXPECT_EQ(rigged->joints, (std::vector<Vec3>{{0, 0, 0}, {-0.5f, 1, -2}}));
     EXPECT_EQ(rigged->weights_each, 4u);
     EXPECT_EQ(rigged->weights, weights);
     EXPECT_EQ(rigged->indices, (std::vector<uint16_t>{0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0}));
