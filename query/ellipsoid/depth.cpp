@@ -11,7 +11,7 @@ namespace {
 
 using glm::dvec3;
 
-constexpr double kTight = 0.9, kSlack = 0x1p-10; // of the depth, and of the smaller body
+constexpr double kTight = 0.9, kLeastShare = 0x1p-10; // of the depth, and of the smaller body
 constexpr uint32_t kMostTriangles = 2048, kDeepestDivision = 12;
 
 struct SphereTriangle {
@@ -23,7 +23,7 @@ struct SphereTriangle {
 
 double least_depth(const PlacedEllipsoid& a, const PlacedEllipsoid& b, double at_least) noexcept {
     const dvec3 r = b.center - a.center;
-    const double slack = kSlack * std::min(a.size, b.size);
+    const double slack = kLeastShare * std::min(a.size, b.size);
     double least = std::numeric_limits<double>::infinity(); // h of a direction
     double bound = least;                                   // of all triangles that are done
     SphereTriangle stack[8 + 3 * kDeepestDivision];
