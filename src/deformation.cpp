@@ -73,6 +73,26 @@ Deformation::Motion Deformation::motion(uint32_t slot, uint32_t mode) const noex
     return out;
 }
 
+Deformation::Moved Deformation::moved(uint32_t slot, std::span<const float> q) const noexcept {
+    const size_t modes = q.size();
+    assert(slot < slots_ && modes == mode_count());
+    const std::byte* row = content_.data() + kModeRows;
+    const std::byte* at = content_.data() + motions_begin(mode_count()) + size_t{slot} * modes * kMotionBytes;
+    Moved out;
+    for (size_t m = 0; m < modes; ++m, row += kModeRowBytes, at += kMotionBytes) {
+        const double step = double{q[m]} * load_le<float>(row + kShiftStep);
+        for (size_t i = 0; i < 3; ++i) {
+            const double shift = load_le<int16_t>(at + kShift + 2 * i) * step;
+            out.shift[i] += shift, out.lengths[i] += std::abs(shift);
+        }
+        const auto steps = load_le<uint16_t>(at + kGrowth);
+        const bool is_radius = (steps & kIsRadius) != 0;
+        const float unit = load_le<float>(row + (is_radius ? kRadiusStep : kGrowthStep));
+        (is_radius ? out.radius : out.growth) += std::abs(double{q[m]}) * ((steps & kMostMotionSteps) * double{unit});
+    }
+    return out;
+}
+
 Vec3 Deformation::point(uint32_t p) const noexcept {
     assert(p < point_count() && !exact_);
     return load_point(content_.data() + static_cast<size_t>(points_begin(mode_count(), slots_)) +
@@ -84,6 +104,21 @@ Vec3 Deformation::displacement(uint32_t p, uint32_t mode) const noexcept {
     assert(p < point_count() && mode < modes);
     return load_point(content_.data() + static_cast<size_t>(displacements_begin(modes, slots_, point_count(), exact_)) +
                       (size_t{p} * modes + mode) * kPointBytes);
+}
+
+Deformation::Moved Deformation::displaced(uint32_t p, std::span<const float> q) const noexcept {
+    const uint32_t modes = mode_count();
+    assert(p < point_count() && q.size() == modes);
+    const std::byte* at = content_.data() +
+                          static_cast<size_t>(displacements_begin(modes, slots_, point_count(), exact_)) +
+                          size_t{p} * modes * kPointBytes;
+    Moved out;
+    for (size_t m = 0; m < modes; ++m)
+        for (size_t i = 0; i < 3; ++i, at += sizeof(float)) {
+            const double shift = double{q[m]} * load_le<float>(at); // exact
+            out.shift[i] += shift, out.lengths[i] += std::abs(shift);
+        }
+    return out;
 }
 
 Result<void> check_deformation(std::span<const std::byte> content, const TreeView& tree) noexcept {

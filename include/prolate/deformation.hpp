@@ -42,6 +42,15 @@ public:
     /// Of the node in `slot`, exactly as stored.
     Motion motion(uint32_t slot, uint32_t mode) const noexcept;
 
+    /// What the coordinates `q`, mode_count() of them, do together: sums over the modes.
+    struct Moved {
+        double shift[3] = {};   ///< metres
+        double lengths[3] = {}; ///< of the shifts' absolute values: what rounding is a share of
+        double growth = 0, radius = 0;
+    };
+    /// To the bound of the node in `slot`; it has motion() for each mode.
+    Moved moved(uint32_t slot, std::span<const float> q) const noexcept;
+
     /// Points of the mesh whose displacements are known. Of exact trees, the vertices, by their numbers. Else one
     /// vertex of each connected part of the surface, with which queries ask whether a body lies inside another.
     uint32_t point_count() const noexcept;
@@ -49,6 +58,8 @@ public:
     Vec3 point(uint32_t p) const noexcept;
     /// U_mode of point `p`, metres.
     Vec3 displacement(uint32_t p, uint32_t mode) const noexcept;
+    /// What coordinates do to point `p`: its growth and radius are 0.
+    Moved displaced(uint32_t p, std::span<const float> q) const noexcept;
 
 private:
     friend class TreeView;

@@ -6,6 +6,13 @@
 #include <cmath>
 
 namespace prolate::query {
+namespace {
+
+glm::dvec3 to_dvec3(const double (&x)[3]) {
+    return {x[0], x[1], x[2]};
+}
+
+} // namespace
 
 Deformed::Deformed(const DeformedBody& body, uint32_t max_level) noexcept
     : body_(body), modes_(body.tree.deformation()), skin_(body.tree.skin()),
@@ -24,33 +31,25 @@ bool Deformed::encloses() const noexcept {
 Bound Deformed::bound(uint32_t node) const noexcept {
     const double scale = tree().scale();
     Bound out{place(tree().bound(node), scale), 0};
-    double moved = 0, grown = 1;
     ModeShift by;
-    for (uint32_t m = 0; m < body_.q.size(); ++m) {
-        const double q = body_.q[m];
-        if (q == 0) continue;
-        const Deformation::Motion motion = modes_->motion(node, m);
-        const glm::dvec3 shift = scale * q * glm::dvec3(motion.shift[0], motion.shift[1], motion.shift[2]);
-        out.core.center += shift, by.shift += shift;
-        moved += glm::length(shift);
-        grown += std::abs(q) * motion.growth;
-        out.radius += scale * std::abs(q) * motion.radius;
+    if (!body_.q.empty()) {
+        const Deformation::Moved moved = modes_->moved(node, body_.q);
+        out.radius = scale * moved.radius;
+        by.shift = scale * to_dvec3(moved.shift), by.spread = moved.growth * out.core.size + out.radius;
+        out.core.center += by.shift;
+        out.core.reach += scale * glm::length(to_dvec3(moved.lengths)) + by.spread;
+        out.core.factor *= 1 + moved.growth;
+        out.core.size *= 1 + moved.growth;
     }
-    by.spread = (grown - 1) * out.core.size + out.radius;
-    out.core.factor *= grown;
-    out.core.reach += moved + by.spread;
-    out.core.size *= grown;
     return skinning_ ? skinning_->moved(node, out, by) : out;
 }
 
 PlacedPoint Deformed::moved(const glm::dvec3& at_rest, uint32_t point) const noexcept {
     PlacedPoint out{at_rest, glm::length(at_rest)};
-    for (uint32_t m = 0; m < body_.q.size(); ++m) {
-        const double q = body_.q[m];
-        if (q == 0) continue;
-        const glm::dvec3 shift = double{tree().scale()} * q * to_double(modes_->displacement(point, m));
-        out.position += shift;
-        out.reach += glm::length(shift);
+    if (!body_.q.empty()) {
+        const double scale = tree().scale();
+        const Deformation::Moved moved = modes_->displaced(point, body_.q);
+        out.position += scale * to_dvec3(moved.shift), out.reach += scale * glm::length(to_dvec3(moved.lengths));
     }
     return skinning_ ? skinning_->moved(point, out) : out;
 }

@@ -127,6 +127,16 @@ TEST(DeformationSection, GoldenFiles) {
         EXPECT_EQ(is_within.radius, 10 * 0.03125);
         EXPECT_EQ(modes.motion(17, 0).radius, 18 * 0.25);
         ASSERT_EQ(modes.point_count(), golden.exact ? kVertices : 2);
+        const float q[] = {-0.25f, 2};
+        const Deformation::Moved node = modes.moved(9, q), odd = modes.moved(16, q), point = modes.displaced(1, q);
+        EXPECT_EQ(node.shift[0], -0.25 * 112.5 + 2 * 455);
+        EXPECT_EQ(node.lengths[1], 0.25 * 225 + 2 * 910);
+        EXPECT_EQ(node.growth, 0);
+        EXPECT_EQ(node.radius, 0.25 * (10 * 0.25) + 2 * (10 * 0.03125));
+        EXPECT_EQ(odd.growth, 0.25 * (316 * 0.0625));
+        EXPECT_EQ(odd.radius, 2 * (17 * 0.03125));
+        EXPECT_EQ(point.shift[1], -0.25 * 1.5 + 2 * 2.5);
+        EXPECT_EQ(point.lengths[2], 0.25 * 1 + 2 * 2);
         EXPECT_EQ(modes.displacement(1, 0), (Vec3{2, 1.5f, 1}));
         EXPECT_EQ(modes.displacement(1, 1), (Vec3{3, 2.5f, 2}));
         if (!golden.exact) {
