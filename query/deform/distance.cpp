@@ -8,7 +8,8 @@
 // apart, so collide(), which opens the same nodes, says so, too.
 //
 // Bounds of ellipsoids and triangles are wrong by what body.hpp adds to the terms of query/ellipsoid/gap.hpp and
-// query/triangle/distance.hpp: 100 + 67 and 110 + 67 u S, within the 256 u S that these demand. Radii come off last.
+// query/triangle/distance.hpp: 100 + 67 and 110 + 67 + 20 u S, within the 256 u S that these demand. Radii come off
+// last.
 #include "query/deform/enclosure.hpp"
 #include "query/deform/pair.hpp"
 #include "query/ellipsoid/gap.hpp"
