@@ -1,12 +1,13 @@
 // A deformed body's nodes, triangles and points, in its own frame, in double precision.
 //
 // Rounding, in the terms of query/ellipsoid/separation.hpp: u = 2^-53, S = all lengths that enter, |q_i d_i| and the
-// growths and radii among them (`reach`). With M <= kMaxModes = 64 modes, a center c + s sum q_i d_i is wrong by at most
-// (M + 3) u S, each product and each sum one rounding, and L (1 + sum |q_i| g_i) by (M + 3) u S; with what both bodies'
-// poses cost, 83 u S, p - a - b is wrong by less than 83 u S + 67 u S, within the 256 u S that is demanded there.
-// Triangles: 91 u S + 67 u S of 256 u S. Rays: 15 + 124 + 67 u S, and 67 u S more where the ray begins at a deformed
-// point; of triangles 352 + 4 * 67 u S. Twice the margins of query/raycast/ray.hpp are taken. Bones (skinning.hpp) pay
-// for what they add to nodes, and add 20 u S to points: 178 of 256 u S between triangles, 352 + 4 * 87 of 704 of rays.
+// growths and radii among them (`reach`). With M <= kMaxModes = 64 modes, a center c + s sum q_i d_i is wrong by at
+// most (M + 3) u S, each product and each sum one rounding, and L (1 + sum |q_i| g_i) by (M + 3) u S; with what both
+// bodies' poses cost, 83 u S, p - a - b is wrong by less than 83 u S + 67 u S, within the 256 u S that is demanded
+// there. Triangles: 91 u S + 67 u S of 256 u S. Rays: 15 + 124 + 67 u S, and 67 u S more where the ray begins at a
+// deformed point; of triangles 352 + 4 * 67 u S. Twice the margins of query/raycast/ray.hpp are taken. Bones
+// (skinning.hpp) pay for what they add to nodes, and add 20 u S to points: 178 of 256 u S between triangles, 352 + 4 *
+// 87 of 704 of rays.
 #pragma once
 
 #include "query/deform/skinning.hpp"
