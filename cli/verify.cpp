@@ -28,23 +28,29 @@ covered. Of a tree baked with --fill, the filled solid is; of one with --keep-ho
 too. An exact tree must hold the mesh's triangles, each in one leaf and in every ellipsoid above it. The ellipsoids of
 an inner cover (bake --inner) must lie inside the solid, or the exit code is 1. Of a tree that deforms, --modes proves
 that its nodes hold the mesh wherever these modes move it, within the tree's ranges; without, only the mesh at rest.
+--skin proves it for the bones and morph targets of a glTF, at all matrices.
 
 Examples:
   prolate verify horse.etree horse.obj
   prolate verify horse.etree horse.obj --json
-  prolate verify moving.etree horse.obj --modes modes.npz)";
+  prolate verify moving.etree horse.obj --modes modes.npz
+  prolate verify hero.etree hero.glb --skin)";
 
 struct VerifyArguments {
     std::string tree, mesh, modes;
     MeshOptions mesh_options;
     uint32_t threads = 0;
-    bool json = false;
+    bool skin = false, json = false;
 };
 
-// What is known of the tree's modes: nothing, if it has none, or none were given.
-using OfModes = std::optional<ModesProof>;
+// What is known of how the tree deforms: nothing, if it does not, or it was not asked for.
+struct MotionProofs {
+    std::optional<ModesProof> modes;
+    std::optional<SkinProof> skin;
+    bool holds() const { return (!modes || modes->proved) && (!skin || skin->proved); }
+};
 
-std::string as_json(const VerifyReport& report, const OfModes& modes, bool same_mesh) {
+std::string as_json(const VerifyReport& report, const MotionProofs& motion, bool same_mesh) {
     nlohmann::ordered_json out;
     out["covered"] = report.covered;
     out["surface_mode"] = report.surface_mode;
@@ -56,8 +62,11 @@ std::string as_json(const VerifyReport& report, const OfModes& modes, bool same_
     if (!report.holes_kept) out["blocked_at"] = report.blocked;
     out["inner_inside"] = report.has_inner ? nlohmann::ordered_json(report.inner_inside) : nullptr;
     if (!report.inner_inside) out["protruding_node"] = report.protruding_node;
+    const auto& [modes, skin] = motion;
     out["modes_hold"] = modes ? nlohmann::ordered_json(modes->proved) : nullptr;
     if (modes && !modes->proved) out["failing_mode"] = {{"mode", modes->mode}, {"node", modes->node}};
+    out["bones_hold"] = skin ? nlohmann::ordered_json(skin->proved) : nullptr;
+    if (skin && !skin->proved) out["failing_bone"] = {{"bone", skin->bone}, {"node", skin->node}};
     out["baked_from_this_mesh"] = same_mesh;
     out["levels"] = nlohmann::ordered_json::array();
     for (const LevelProof& level : report.levels) {
@@ -75,7 +84,8 @@ std::string as_json(const VerifyReport& report, const OfModes& modes, bool same_
     return out.dump(2) + '\n';
 }
 
-std::string as_text(const VerifyReport& report, const OfModes& modes) {
+std::string as_text(const VerifyReport& report, const MotionProofs& motion) {
+    const auto& [modes, skin] = motion;
     std::string out;
     for (size_t l = 0; l < report.levels.size(); ++l) {
         const LevelProof& level = report.levels[l];
@@ -111,9 +121,50 @@ std::string as_text(const VerifyReport& report, const OfModes& modes) {
                    : fmt::format("modes: node {} does NOT certainly hold the mesh as mode {} moves it, or the "
                                  "tree was baked with another one\n",
                                  modes->node, modes->mode + 1);
+    if (skin)
+        out += skin->proved ? "bones: the nodes hold the mesh at all matrices, proved\n"
+                            : fmt::format("bones: node {} does NOT certainly hold what bone {} moves, or the tree was "
+                                          "baked with other weights\n",
+                                          skin->node, skin->bone + 1);
     if (report.surface_mode) out += "surface mode: the mesh is open, so the proof is about its triangles only\n";
     out += report.covered ? "covered\n" : "NOT covered\n";
     return out;
+}
+
+// What the glTF's rig says, by the tree's ranges.
+Outcome<MotionProofs> prove_rig(const TreeView& tree, const std::string& mesh, const Placement& placement) {
+    auto rigged = read_rigged_mesh(mesh, placed_as(placement));
+    if (!rigged) return rigged.error();
+    const auto modes = tree.deformation();
+    if (modes.has_value() == rigged->modes.empty() || tree.skin().has_value() == rigged->bones.empty())
+        return Failure{kBadInput, mesh, "has another rig than the tree", "bake it with --skin"};
+    MotionProofs out;
+    if (modes) {
+        rigged->ranges.clear();
+        for (uint32_t m = 0; m < modes->mode_count(); ++m) rigged->ranges.push_back(modes->range(m));
+        const auto proof = verify_modes(tree, rigged->mesh.view(), rigged->morphs());
+        if (!proof) return failure_of(mesh, proof.error());
+        out.modes = *proof;
+    }
+    if (tree.skin()) {
+        const auto proof = verify_skin(tree, rigged->mesh.view(), rigged->skin());
+        if (!proof) return failure_of(mesh, proof.error());
+        out.skin = *proof;
+    }
+    return out;
+}
+
+Outcome<MotionProofs> prove_motion(const TreeView& tree, const Mesh& mesh, const VerifyArguments& a) {
+    if (a.skin && !a.modes.empty())
+        return Failure{kUsage, "--skin", "takes the file's morph targets for modes", "give it, or --modes"};
+    if (a.skin) return prove_rig(tree, a.mesh, mesh.placement);
+    if (!a.modes.empty()) {
+        const auto known = prove_modes(tree, mesh, a.modes);
+        return known ? Outcome<MotionProofs>(MotionProofs{known->proof, {}}) : Outcome<MotionProofs>(known.error());
+    }
+    if (tree.deformation()) note(a.tree, "this tree deforms, which is not proved without its modes; give --modes");
+    if (tree.skin()) note(a.tree, "bones move this tree, which is not proved without them; give --skin");
+    return MotionProofs{};
 }
 
 Outcome<ExitCode> run(const VerifyArguments& a) {
@@ -122,14 +173,8 @@ Outcome<ExitCode> run(const VerifyArguments& a) {
     if (!tree) return tree.error();
     const auto mesh = read_mesh_of(tree->view(), a.mesh, a.mesh_options);
     if (!mesh) return mesh.error();
-    OfModes modes;
-    if (!a.modes.empty()) {
-        const auto known = prove_modes(tree->view(), mesh->as_read, a.modes);
-        if (!known) return known.error();
-        modes = known->proof;
-    } else if (tree->view().deformation()) {
-        note(a.tree, "this tree deforms, which is not proved without its modes; give --modes");
-    }
+    const auto motion = prove_motion(tree->view(), mesh->as_read, a);
+    if (!motion) return motion.error();
     const BakeInfo info = tree->view().bake_info();
     describe_mesh(a.mesh, mesh->cleaned.report, {.exact = info.exact, .filled = info.fill > 0});
     if (!mesh->own) note(a.tree, "this tree was baked from another mesh");
@@ -141,8 +186,8 @@ Outcome<ExitCode> run(const VerifyArguments& a) {
         return verify(tree->view(), mesh->as_read.view(), options);
     }();
     if (!report) return failure_of(a.mesh, report.error());
-    print(a.json ? as_json(*report, modes, mesh->own) : as_text(*report, modes));
-    return report->covered && (!modes || modes->proved) ? kDone : kNo;
+    print(a.json ? as_json(*report, *motion, mesh->own) : as_text(*report, *motion));
+    return report->covered && motion->holds() ? kDone : kNo;
 }
 
 } // namespace
@@ -155,6 +200,7 @@ void add_verify(CLI::App& app, Work& chosen) {
     declare_mesh_options(*command, a->mesh_options, true);
     command->add_option("--modes", a->modes,
                         "how the mesh deforms, the file that bake had: proves that the nodes hold it");
+    command->add_flag("--skin", a->skin, "of glTF and GLB: proves that the nodes hold it at all matrices of its bones");
     command->add_option("-j,--threads", a->threads, "0 = all cores")->capture_default_str();
     command->add_flag("--json", a->json, "print JSON");
     command->footer(kVerifyFooter);

@@ -394,6 +394,88 @@ std::string npy(const std::string& shape, const std::vector<float>& values) {
     return out.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
 }
 
+// A cube of two bones and a morph target, the weight of whose first vertex for the first bone is `first`.
+std::string skinned_glb(float first) {
+    const Mesh mesh = cube();
+    const size_t n = mesh.vertices.size();
+    std::string data, views, accessors;
+    const auto add = [&](const void* from, size_t size, const std::string& words) {
+        const std::string at = std::to_string(data.size()),
+                          index = std::to_string(std::count(views.begin(), views.end(), '{'));
+        views += (views.empty() ? "" : ",") + (R"({"buffer":0,"byteOffset":)" + at) + R"(,"byteLength":)" +
+                 std::to_string(size) + "}";
+        accessors += (accessors.empty() ? "" : ",") + (R"({"bufferView":)" + index) + "," + words + "}";
+        data.append(static_cast<const char*>(from), size);
+    };
+    const std::string rows = R"("count":)" + std::to_string(n);
+    std::vector<float> weights, up(3 * n);
+    std::vector<uint8_t> joints;
+    for (size_t v = 0; v < n; ++v) {
+        const float w = v == 0 ? first : mesh.vertices[v].x > 0 ? 0.25f : 1;
+        weights.insert(weights.end(), {w, mesh.vertices[v].x > 0 ? 0.75f : 0, 0, 0});
+        joints.insert(joints.end(), {0, 1, 0, 0});
+        up[3 * v + 2] = mesh.vertices[v].z;
+    }
+    add(mesh.vertices.data(), 12 * n, R"("componentType":5126,"type":"VEC3",)" + rows);
+    add(mesh.triangles.data(), 12 * mesh.triangles.size(),
+        R"("componentType":5125,"type":"SCALAR","count":)" + std::to_string(3 * mesh.triangles.size()));
+    add(joints.data(), joints.size(), R"("componentType":5121,"type":"VEC4",)" + rows);
+    add(weights.data(), 16 * n, R"("componentType":5126,"type":"VEC4",)" + rows);
+    add(up.data(), 12 * n, R"("componentType":5126,"type":"VEC3",)" + rows);
+    std::string json =
+        R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"skin":0},{},{}],)"
+        R"("skins":[{"joints":[1,2]}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"JOINTS_0":2,)"
+        R"("WEIGHTS_0":3},"indices":1,"targets":[{"POSITION":4}]}]}],"buffers":[{"byteLength":)" +
+        std::to_string(data.size()) + R"(}],"bufferViews":[)" + views + R"(],"accessors":[)" + accessors + "]}";
+    json.append((4 - json.size() % 4) % 4, ' ');
+    std::string out = "glTF";
+    const auto put = [&out](size_t x) {
+        const auto word = static_cast<uint32_t>(x);
+        out.append(reinterpret_cast<const char*>(&word), 4);
+    };
+    put(2), put(12 + 8 + json.size() + 8 + data.size());
+    put(json.size()), out += "JSON", out += json;
+    put(data.size()), out.append("BIN\0", 4);
+    return out + data;
+}
+
+TEST_F(Cli, BakeTakesSkinsAndMorphTargetsOfGltf) {
+    const float first = cube().vertices[0].x > 0 ? 0.25f : 1;
+    const std::string mesh = file("cube.glb", skinned_glb(first)), tree = file("a.etree");
+    const std::vector<std::string> words{"bake", mesh, "-o", tree, "--ellipsoids", "1", "--quality", "fast", "--skin"};
+    const Outcome good = run(words);
+    ASSERT_EQ(good.code, 0) << good.err;
+    EXPECT_NE(good.out.find("by 1 mode, coordinates within 1; proved; "), std::string::npos) << good.out;
+    EXPECT_NE(good.out.find("by 2 bones, at all matrices; proved; "), std::string::npos) << good.out;
+    const Json info = Json::parse(run({"info", tree, "--json"}).out);
+    EXPECT_EQ(info["bones"], 2);
+    EXPECT_GT(info["skin_bytes"], 0);
+    const Outcome blind = run({"verify", tree, mesh});
+    EXPECT_EQ(blind.code, 0);
+    EXPECT_NE(blind.err.find("not proved without them; give --skin"), std::string::npos) << blind.err;
+    const Outcome proved = run({"verify", tree, mesh, "--skin"});
+    EXPECT_EQ(proved.code, 0) << proved.err;
+    EXPECT_NE(proved.out.find("modes: the nodes hold the mesh"), std::string::npos) << proved.out;
+    EXPECT_NE(proved.out.find("bones: the nodes hold the mesh at all matrices"), std::string::npos) << proved.out;
+
+    // What is wrong is one line, and no file.
+    const auto fails = [&](const Outcome& bad, int code, const char* text) {
+        EXPECT_EQ(bad.code, code);
+        EXPECT_NE(bad.err.find(text), std::string::npos) << bad.err;
+        EXPECT_FALSE(fs::exists(file("b.etree")));
+    };
+    const auto bake = [&](const std::string& from, std::initializer_list<std::string> options) {
+        std::vector<std::string> command{"bake", from,     "-o",        file("b.etree"), "--ellipsoids",
+                                         "1",    "--skin", "--quality", "fast"};
+        command.insert(command.end(), options);
+        return run(command);
+    };
+    fails(bake(file("odd.glb", skinned_glb(first + 0.5f)), {}), 3, "do not add up to 1");
+    fails(bake(file("cube.obj", obj_text(cube())), {}), 3, "only glTF files");
+    fails(bake(mesh, {"--modes", "u.npy"}), 2, "--skin");
+    fails(bake(mesh, {"--range", "1,2"}), 2, "1 morph targets");
+}
+
 TEST_F(Cli, BakeTakesModesFromNumpysFiles) {
     const std::string mesh = file("cube.obj", obj_text(cube())), tree = file("a.etree");
     const size_t vertices = cube().vertices.size();
