@@ -70,10 +70,19 @@ struct SolidsResult {
     QueryStats stats;
 };
 
+/// Temporal coherence of one pair of solids, as PairCache is: of the outer covers, and the inner leaves that met last,
+/// which are tested first. Owned by the caller, 100 bytes. Reset it (`= {}`) when a body's tree or level changes. What
+/// is certain is the same with and without; with it, poses may be decided that differ from contact by rounding.
+struct SolidsCache {
+    PairCache outer;
+    DistanceCache inner; ///< valid if they certainly met
+};
+static_assert(sizeof(SolidsCache) == 100);
+
 /// Do the solids meet, or come within options.margin of each other? A search of the outer covers, and if these meet,
 /// one of the inner covers.
 SolidsResult collide(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,
-                     const SolidsOptions& options = {}) noexcept;
+                     const SolidsOptions& options = {}, SolidsCache* cache = nullptr) noexcept;
 
 /// Answer of distance().
 struct SolidsDistance {

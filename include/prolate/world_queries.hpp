@@ -62,7 +62,8 @@ Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::
 /// Do the solids meet, and how far apart are they? As collide() and distance() of a Solid (solids.hpp). Over a
 /// half-space, a solid certainly meets it where a leaf of its inner cover reaches into it.
 Result<void> collide(const World& world, std::span<const BodyPair> pairs, std::span<SolidsResult> out,
-                     const Workers& workers, const SolidsOptions& options = {}) noexcept;
+                     const Workers& workers, const SolidsOptions& options = {},
+                     std::span<OfPair<SolidsCache>> caches = {}) noexcept;
 Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::span<SolidsDistance> out,
                       const Workers& workers, const DistanceOptions& options = {}) noexcept;
 

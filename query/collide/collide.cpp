@@ -40,8 +40,14 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, do
            query::kSeparationMargin * (2 * reach_b + before.distance + now.distance);
 }
 
-// Does the pair that the cache names exist?
-bool names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b) {
+// Only whole searches are remembered: a level limit asks another question.
+bool usable(const PairCache* cache, const TreeView& a, const TreeView& b, const QueryOptions& options) {
+    return cache && options.max_level + 1 >= std::max(a.level_count(), b.level_count());
+}
+
+} // namespace
+
+bool query::names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b) noexcept {
     const auto good = [](const TreeView& tree, uint32_t node, uint32_t triangle) {
         if (node >= tree.slot_count() || !tree.is_node(node) || !tree.is_leaf(node)) return false;
         const TriangleRange range = tree.triangles(node);
@@ -49,13 +55,6 @@ bool names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b)
     };
     return good(a, pair.node_a, pair.triangle_a) && good(b, pair.node_b, pair.triangle_b);
 }
-
-// Only whole searches are remembered: a level limit asks another question.
-bool usable(const PairCache* cache, const TreeView& a, const TreeView& b, const QueryOptions& options) {
-    return cache && options.max_level + 1 >= std::max(a.level_count(), b.level_count());
-}
-
-} // namespace
 
 double query::gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
     const PlacedEllipsoid root_a = place(a.root_bound(), a.scale()), root_b = place(b.root_bound(), b.scale());
@@ -139,7 +138,7 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     };
     if (!cache) return answer(query::decide(search));
 
-    if (cache->verdict == Verdict::overlapping && names_leaves(cache->pair, a, b)) {
+    if (cache->verdict == Verdict::overlapping && query::names_leaves(cache->pair, a, b)) {
         const MeetingPair last = bodies.exchanged ? query::exchanged(cache->pair) : cache->pair;
         if (search.meets(last)) {
             search.take(last);

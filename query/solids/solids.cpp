@@ -90,7 +90,7 @@ Verdict SolidPair::outer_meet(float margin) noexcept {
     return verdict;
 }
 
-Verdict SolidPair::inner_meet(float margin, float uncertainty) noexcept {
+Verdict SolidPair::inner_meet(float margin, float uncertainty, DistanceCache* cache) noexcept {
     const double radii = double{inner_a().radius()} + inner_b().radius();
     // The pair that is named is as near as that, so that it is certain but for rounding.
     const float nearly = with_radius(std::max(0.0f, margin - uncertainty), radii);
@@ -100,14 +100,24 @@ Verdict SolidPair::inner_meet(float margin, float uncertainty) noexcept {
     const Verdict verdict = decide(search);
     add(search.stats, stats);
     if (verdict != Verdict::overlapping) return verdict;
-    const double within = (double{margin} - double{uncertainty}) + radii;
-    return come_within(pair, search.found == 0, within) ? verdict : Verdict::separated; // as far as can be told
+    const bool enclosed = search.found == 0;
+    if (!come_within(pair, enclosed, within(margin, uncertainty))) return Verdict::separated; // as far as can be told
+    if (cache != nullptr && !enclosed) *cache = {true, bodies_.exchanged ? exchanged(pair) : pair};
+    return verdict;
 }
 
-SolidsResult SolidPair::answer(Verdict outer, float margin, float uncertainty) noexcept {
+bool SolidPair::still_meet(const DistanceCache& cache, float margin, float uncertainty) noexcept {
+    if (!cache.valid || left() == 0 || are_triangles() || !have_inner()) return false;
+    const MeetingPair pair = bodies_.exchanged ? exchanged(cache.pair) : cache.pair;
+    if (!names_leaves(pair, inner_a(), inner_b())) return false;
+    ++stats.pair_tests;
+    return come_within(pair, false, within(margin, uncertainty));
+}
+
+SolidsResult SolidPair::answer(Verdict outer, float margin, float uncertainty, DistanceCache* cache) noexcept {
     if (outer != Verdict::overlapping || are_triangles()) return {outer, outer == Verdict::undecided, stats};
     if (!have_inner()) return {Verdict::undecided, false, stats};
-    const Verdict inner = inner_meet(margin, uncertainty);
+    const Verdict inner = inner_meet(margin, uncertainty, cache);
     if (inner == Verdict::overlapping) return {inner, false, stats};
     return {Verdict::undecided, inner == Verdict::undecided, stats};
 }
@@ -156,15 +166,19 @@ double SolidPair::depth() noexcept {
 } // namespace query
 
 SolidsResult collide(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,
-                     const SolidsOptions& options) noexcept {
+                     const SolidsOptions& options, SolidsCache* cache) noexcept {
     query::SolidPair pair(a, pose_a, b, pose_b, context, options.max_pair_tests);
     if (!pair.may_be_asked()) return {};
     const float margin = query::sound_length(options.margin), uncertainty = query::sound_length(options.uncertainty);
     const float at_most = query::with_radius(margin, double{uncertainty});
-    if (!pair.are_triangles()) return pair.answer(pair.outer_meet(at_most), margin, uncertainty);
-    const CollideResult exact = collide(a.outer(), pose_a, b.outer(), pose_b, context,
-                                        {.max_pair_tests = options.max_pair_tests, .margin = at_most});
-    return {exact.verdict, exact.verdict == Verdict::undecided, exact.stats};
+    if (cache == nullptr && !pair.are_triangles()) return pair.answer(pair.outer_meet(at_most), margin, uncertainty);
+    if (cache != nullptr && pair.still_meet(cache->inner, margin, uncertainty))
+        return {Verdict::overlapping, false, pair.stats};
+    const CollideResult outer =
+        collide(a.outer(), pose_a, b.outer(), pose_b, context, {.max_pair_tests = pair.left(), .margin = at_most},
+                cache != nullptr ? &cache->outer : nullptr);
+    query::add(outer.stats, pair.stats);
+    return pair.answer(outer.verdict, margin, uncertainty, cache != nullptr ? &cache->inner : nullptr);
 }
 
 SolidsDistance distance(const Solid& a, const Pose& pose_a, const Solid& b, const Pose& pose_b, Scratch context,

@@ -28,10 +28,13 @@ public:
     /// collide() of the outer covers.
     Verdict outer_meet(float margin) noexcept;
     /// What collide() of solids answers, whose outer covers come within margin + uncertainty, or not: `outer`.
-    SolidsResult answer(Verdict outer, float margin, float uncertainty) noexcept;
+    SolidsResult answer(Verdict outer, float margin, float uncertainty, DistanceCache* cache = nullptr) noexcept;
     /// Do the inner covers, or what takes their place, certainly come within the margin of each other, even if they are
-    /// displaced by `uncertainty`? Both sound lengths. Undecided if the budget ended first.
-    Verdict inner_meet(float margin, float uncertainty) noexcept;
+    /// displaced by `uncertainty`? Both sound lengths. Undecided if the budget ended first. A cache names the leaves
+    /// that are tested first, and gets those that meet.
+    Verdict inner_meet(float margin, float uncertainty, DistanceCache* cache = nullptr) noexcept;
+    /// Do the leaves that a cache names meet so? One test; false if it names none.
+    bool still_meet(const DistanceCache& cache, float margin, float uncertainty) noexcept;
     /// Is what a query of the inner covers, in the order of the caller, calls overlapping certain to meet?
     bool certainly_meet(MeetingPair pair, bool enclosed) const noexcept;
     /// A certified lower bound of the depth, metres: that of the deepest pair of inner ellipsoids. 0 within the budget
@@ -45,6 +48,10 @@ public:
 private:
     const TreeView& inner_a() const { return *first_.inner(); }
     const TreeView& inner_b() const { return *second_.inner(); }
+    /// How near is near enough, metres.
+    double within(float margin, float uncertainty) const {
+        return (double{margin} - double{uncertainty}) + (double{inner_a().radius()} + inner_b().radius());
+    }
     bool come_within(const MeetingPair& pair, bool enclosed, double within) const;
     bool leaves_hold_ball(double radius) const;
 

@@ -89,11 +89,13 @@ Result<void> distance(const World& world, std::span<const BodyPair> pairs, std::
 }
 
 Result<void> collide(const World& world, std::span<const BodyPair> pairs, std::span<SolidsResult> out,
-                     const Workers& workers, const SolidsOptions& options) noexcept {
-    if (const auto good = check(world, pairs, out.size(), SIZE_MAX, workers); !good) return good;
-    for_pairs(world, pairs, workers, [&](const BodyPair&, const Body& a, const Body& b, Scratch context, uint32_t i) {
-        out[i] = query::collide_solids(a, b, context, options);
-    });
+                     const Workers& workers, const SolidsOptions& options,
+                     std::span<OfPair<SolidsCache>> caches) noexcept {
+    if (const auto good = check(world, pairs, out.size(), slots(caches), workers); !good) return good;
+    for_pairs(world, pairs, workers,
+              [&](const BodyPair& pair, const Body& a, const Body& b, Scratch context, uint32_t i) {
+                  out[i] = query::collide_solids(a, b, context, options, Caches<SolidsCache>{caches}.of(pair));
+              });
     return {};
 }
 

@@ -187,9 +187,11 @@ DistanceResult distance(const Body& a, const Body& b, Scratch context, const Dis
     return out;
 }
 
-SolidsResult collide_solids(const Body& a, const Body& b, Scratch context, const SolidsOptions& options) noexcept {
+SolidsResult collide_solids(const Body& a, const Body& b, Scratch context, const SolidsOptions& options,
+                            SolidsCache* cache) noexcept {
     const TreeView *x = a.tree(), *y = b.tree();
-    if (x != nullptr && y != nullptr) return prolate::collide(Solid(*x), a.pose, Solid(*y), b.pose, context, options);
+    if (x != nullptr && y != nullptr)
+        return prolate::collide(Solid(*x), a.pose, Solid(*y), b.pose, context, options, cache);
     if (x != nullptr) return solid_on_ground(a, *b.half_space(), context, options);
     return y != nullptr ? solid_on_ground(b, *a.half_space(), context, options) : SolidsResult{};
 }

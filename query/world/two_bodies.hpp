@@ -17,7 +17,8 @@ CollideResult collide(const Body& a, const Body& b, Scratch context, const Query
                       PairCache* cache) noexcept;
 DistanceResult distance(const Body& a, const Body& b, Scratch context, const DistanceOptions& options,
                         DistanceCache* cache) noexcept;
-SolidsResult collide_solids(const Body& a, const Body& b, Scratch context, const SolidsOptions& options) noexcept;
+SolidsResult collide_solids(const Body& a, const Body& b, Scratch context, const SolidsOptions& options,
+                            SolidsCache* cache) noexcept;
 SolidsDistance distance_solids(const Body& a, const Body& b, Scratch context, const DistanceOptions& options) noexcept;
 ContactResult contacts(const Body& a, const Body& b, ContactManifolds& manifolds, Scratch context,
                        const QueryOptions& options) noexcept;

@@ -447,6 +447,35 @@ TEST_F(Solids, DepthsHoldForRoundedBodiesAndUncertainPoses) {
     EXPECT_GT(out, 1000u);
 }
 
+TEST_F(Solids, CachesSpareWorkAndChangeNoAnswer) {
+    Random random(12);
+    uint64_t tests = 0, cached_tests = 0;
+    uint32_t counts[3] = {};
+    const Solid x(torus().covers.view()), y(crossed().covers.view());
+    for (int i = 0; i < 150; ++i) {
+        const SolidsOptions options{.margin = i % 4 == 0 ? 0.05f : 0, .uncertainty = i % 3 == 0 ? 0.01f : 0};
+        SolidsCache cache;
+        if (i % 10 == 0) cache.inner = {true, {4000000000u, 7, 3, 5}}; // of other trees
+        Pose a{{}, random.rotation()}, b = near_pose(random);
+        const auto d = random.direction();
+        for (int step = 0; step < 20; ++step) {
+            const SolidsResult alone = collide(x, a, y, b, context(), options);
+            const SolidsResult found = collide(x, a, y, b, context(), options, &cache);
+            ASSERT_EQ(found.verdict, alone.verdict) << i << " " << step;
+            ++counts[static_cast<int>(found.verdict)];
+            tests += alone.stats.tests(), cached_tests += found.stats.tests();
+            b.translation.x += static_cast<float>(0.002 * d[0]);
+            b.translation.y += static_cast<float>(0.002 * d[1]);
+            a.translation.z += static_cast<float>(0.002 * d[2]);
+        }
+        SolidsCache none;
+        EXPECT_LE(collide(x, a, y, b, context(), {.max_pair_tests = 5}, &none).stats.tests(), 5u);
+        EXPECT_EQ(collide(x, a, y, b, context(), {.max_pair_tests = 0}, &cache).stats.tests(), 0u);
+    }
+    for (const uint32_t count : counts) EXPECT_GT(count, 100u);
+    EXPECT_LT(cached_tests, tests / 2);
+}
+
 TEST_F(Solids, PairsOfAWorldAreAnsweredAsTwoSolids) {
     Random random(10);
     constexpr HalfSpace kFloor{{0, 0, 3}, -1.2f};
@@ -470,6 +499,12 @@ TEST_F(Solids, PairsOfAWorldAreAnsweredAsTwoSolids) {
     std::vector<DistanceResult> wanted(pairs.size());
     std::vector<CollideResult> wanted_with_margin(pairs.size());
     ASSERT_TRUE(collide(covers, pairs, found, workers));
+    std::vector<OfPair<SolidsCache>> caches(covers.slot_count());
+    for (int round = 0; round < 2; ++round) {
+        std::vector<SolidsResult> cached(pairs.size());
+        ASSERT_TRUE(collide(covers, pairs, cached, workers, {}, caches));
+        for (size_t i = 0; i < pairs.size(); ++i) EXPECT_EQ(cached[i].verdict, found[i].verdict) << i;
+    }
     ASSERT_TRUE(collide(covers, pairs, with_margin, workers, {.margin = 0.2f, .uncertainty = 1e-4f}));
     ASSERT_TRUE(distance(covers, pairs, apart, workers));
     ASSERT_TRUE(distance(exact, pairs, wanted, workers)); // ids are the same in both
