@@ -71,10 +71,10 @@ private:
 
 /// A climb, a step at a time.
 struct Climb {
-    const Hills* hills = nullptr;
-    glm::dvec3 up;                   ///< in the tree's frame
-    uint32_t vertex = 0, second = 0; ///< where it is: a vertex, or the edge between these
-    uint32_t steps_left = 0;         ///< 0: it is at its end
+    const Hills* hills;
+    glm::dvec3 up;           ///< in the tree's frame
+    uint32_t vertex, second; ///< where it is: a vertex, or the edge between these
+    uint32_t steps_left;     ///< 0: it is at its end
 
     /// One step; returns by how much it rises.
     double step() noexcept;

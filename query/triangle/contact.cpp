@@ -24,11 +24,11 @@ constexpr double kAskance = 0.3; // cosine: a face that looks this much the same
 
 struct Axis {
     enum class Kind : uint8_t { none, face_a, face_b, edges };
-    Kind kind = Kind::none;
-    dvec3 normal{0, 0, 1};
-    double overlap = 0; // of the triangles; of edges with what they must win by
-    Feature edge_a = 0, edge_b = 0;
-    Climb climb_a{}, climb_b{};
+    Kind kind;
+    dvec3 normal;
+    double overlap; // of the triangles; of edges with what they must win by
+    Feature edge_a, edge_b;
+    Climb climb_a, climb_b;
 };
 
 dvec3 unit_or_zero(const dvec3& v) {
@@ -41,7 +41,10 @@ public:
     Axes(const TrianglePair& pair, bool closed_a, bool closed_b)
         : pair_(pair), out_a_(closed_a ? unit_or_zero(pair.normal_a) : dvec3(0)),
           out_b_(closed_b ? unit_or_zero(pair.normal_b) : dvec3(0)) {
-        for (size_t i = 0; i < 3; ++i) size_ = std::max({size_, glm::length(pair.d[i]), glm::length(pair.e[i])});
+        for (size_t i = 0; i < 3; ++i) {
+            length_d_[i] = glm::length(pair.d[i]), length_e_[i] = glm::length(pair.e[i]);
+            size_ = std::max({size_, length_d_[i], length_e_[i]});
+        }
     }
     double touching() const { return kFlat * size_; }
     // May B be pushed along n?
@@ -54,8 +57,7 @@ public:
             face(Axis::Kind::face_b, sign * unit_or_zero(pair_.normal_b));
         }
         for (size_t i = 0; i < 3; ++i)
-            for (size_t j = 0; j < 3; ++j)
-                for (const double sign : {1.0, -1.0}) edges(i, j, sign);
+            for (size_t j = 0; j < 3; ++j) edges(i, j);
         for (uint32_t i = 0; i < count_; ++i) start(axes_[i], a, b, known);
         const double limit = known.overlap + kNoLonger * std::abs(known.overlap) + touching();
         // Always the least one climbs a step: what it rises only adds to the overlap.
@@ -69,7 +71,9 @@ public:
             if (climb == nullptr) return *least;
             least->overlap += climb->step();
         }
-        return {};
+        Axis none{};
+        none.normal = {0, 0, 1};
+        return none;
     }
 
 private:
@@ -88,31 +92,40 @@ private:
     double overlap(const dvec3& n) const { return pair_.range_a(n).high - pair_.range_b(n).low; }
     void face(Axis::Kind kind, const dvec3& n) {
         if (n == dvec3(0) || !leads_out(n)) return;
-        axes_[count_++] = {kind, n, overlap(n)};
-        least_face_ = std::min(least_face_, axes_[count_ - 1].overlap);
+        least_face_ = std::min(least_face_, add(kind, n, overlap(n)).overlap);
     }
-    void edges(size_t i, size_t j, double sign) {
-        const dvec3 &d = pair_.d[i], &e = pair_.e[j], product = sign * glm::cross(d, e);
+    void edges(size_t i, size_t j) {
+        const dvec3 product = glm::cross(pair_.d[i], pair_.e[j]);
         const double length = glm::length(product);
-        if (!(length > kParallel * glm::length(d) * glm::length(e))) return;
-        const dvec3 n = product / length;
-        if (!leads_out(n)) return;
-        const double high = pair_.range_a(n).high, low = pair_.range_b(n).low;
+        if (!(length > kParallel * length_d_[i] * length_e_[j])) return;
         // Both edges must lie where the triangles are farthest.
-        if (glm::dot(n, pair_.p[i]) < high - touching() || glm::dot(n, pair_.q[j]) > low + touching()) return;
+        const TrianglePair::Range a = pair_.range_a(product), b = pair_.range_b(product);
+        const double at_a = glm::dot(product, pair_.p[i]), at_b = glm::dot(product, pair_.q[j]);
+        const double least = touching() * length;
+        if (at_a >= a.high - least && at_b <= b.low + least) crossing(i, j, product / length);
+        if (at_a <= a.low + least && at_b >= b.high - least) crossing(i, j, product / -length);
+    }
+    void crossing(size_t i, size_t j, const dvec3& n) {
+        if (!leads_out(n)) return;
+        const dvec3 &d = pair_.d[i], &e = pair_.e[j];
         // And cross, as seen along the normal.
         const auto [s, t] = closest(d, e, pair_.p[i] - pair_.q[j]);
         const dvec3 between = pair_.p[i] + s * d - (pair_.q[j] + t * e);
         if (glm::length(between - glm::dot(n, between) * n) > kCrossing * size_) return;
         const double bias = std::isfinite(least_face_) ? kEdgeBias * std::abs(least_face_) + touching() : 0;
-        axes_[count_++] = {Axis::Kind::edges, n, high - low + bias, static_cast<Feature>(kFirstEdge + i),
-                           static_cast<Feature>(kFirstEdge + j)};
+        Axis& axis = add(Axis::Kind::edges, n, overlap(n) + bias);
+        axis.edge_a = static_cast<Feature>(kFirstEdge + i), axis.edge_b = static_cast<Feature>(kFirstEdge + j);
+    }
+    Axis& add(Axis::Kind kind, const dvec3& n, double overlap) {
+        Axis& axis = axes_[count_++];
+        axis.kind = kind, axis.normal = n, axis.overlap = overlap;
+        return axis;
     }
 
     const TrianglePair& pair_;
     const dvec3 out_a_, out_b_; // outward normals of closed meshes; else 0
-    double size_ = 0, least_face_ = std::numeric_limits<double>::infinity();
-    Axis axes_[4 + 18];
+    double length_d_[3], length_e_[3], size_ = 0, least_face_ = std::numeric_limits<double>::infinity();
+    Axis axes_[4 + 18]; // not cleared
     uint32_t count_ = 0;
 };
 
