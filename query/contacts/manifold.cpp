@@ -27,7 +27,7 @@ bool instead(const Candidate& old, const Candidate& other, double ahead, double 
 Patch::Patch(const dvec3& normal) noexcept
     : Patch(normal, glm::cross(normal, std::abs(normal.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0))) {}
 
-Patch::Patch(const dvec3& normal, const dvec3& along) noexcept : seed_(normal) {
+Patch::Patch(const dvec3& normal, const dvec3& along, double lean) noexcept : seed_(normal), lean_(lean) {
     x_ = glm::normalize(along - glm::dot(along, normal) * normal);
     y_ = glm::cross(normal, x_);
 }
@@ -42,9 +42,10 @@ bool Patch::add(const dvec3& normal, const Candidate& candidate, double weight, 
     overlap_ = std::max(overlap_, overlap);
     const double x = glm::dot(x_, candidate.middle), y = glm::dot(y_, candidate.middle);
     constexpr double kDiagonal = 0.7071067811865476;
-    const double values[] = {candidate.depth,     x,  y,  kDiagonal * (x + y),
-                             kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y),
-                             kDiagonal * (y - x)};
+    double values[] = {candidate.depth,    x, y, kDiagonal * (x + y), kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y),
+                       kDiagonal * (y - x)};
+    if (lean_ != 0)
+        for (uint32_t i = 1; i < kSieve; ++i) values[i] += lean_ * candidate.depth;
     uint32_t better = 0, others = 0; // bits of best_; of kept_, those that stay
     for (uint32_t i = 0; i < kSieve; ++i) {
         const double same = i == 0 ? std::min(same_point, kSameDepth * std::abs(candidate.depth)) : same_point;

@@ -46,8 +46,9 @@ public:
     static constexpr uint32_t kSieve = 9; ///< the deepest; the farthest in eight directions
 
     explicit Patch(const glm::dvec3& normal) noexcept;
-    /// `along`: what the first of directions() is to be, about; not parallel to the normal.
-    Patch(const glm::dvec3& normal, const glm::dvec3& along) noexcept;
+    /// `along`: what the first of directions() is to be, about; not parallel to the normal. `lean`: what a point counts
+    /// as farther out for each metre that it is deeper.
+    Patch(const glm::dvec3& normal, const glm::dvec3& along, double lean = 0) noexcept;
     Patch() = default;
 
     bool takes(const glm::dvec3& normal) const noexcept;
@@ -61,7 +62,7 @@ public:
         constexpr double kDiagonal = 0.7071067811865476;
         return {x_, y_, kDiagonal * (x_ + y_), kDiagonal * (x_ - y_)};
     }
-    /// Between which heights the points lie along one of directions(), if there are any.
+    /// Between which heights the points count as lying along one of directions(), if there are any.
     Extent extent(uint32_t i) const noexcept { return {-reach_[5 + i], reach_[1 + i]}; }
     /// May a point of this depth take a place, were it known of the last query? All may, as long as there are none.
     bool may_take(const glm::dvec3& middle, double depth, double same_point) const noexcept {
@@ -69,8 +70,8 @@ public:
         constexpr double kDiagonal = 0.7071067811865476;
         const double values[] = {
             depth, x, y, kDiagonal * (x + y), kDiagonal * (x - y), -x, -y, -kDiagonal * (x + y), kDiagonal * (y - x)};
-        bool may = !any_;
-        for (uint32_t i = 0; i < kSieve; ++i) may = may || values[i] > reach_[i] - same_point;
+        bool may = !any_ || depth > reach_[0] - same_point;
+        for (uint32_t i = 1; i < kSieve; ++i) may = may || values[i] + lean_ * depth > reach_[i] - same_point;
         return may;
     }
     /// By how much a point that is no deeper than `depth`, and along each direction d within extent(d), may be deeper
@@ -113,7 +114,7 @@ public:
 
 private:
     glm::dvec3 seed_{0, 0, 1}, x_{1, 0, 0}, y_{0, 1, 0}, sum_{0, 0, 0};
-    double weight_ = 0;
+    double weight_ = 0, lean_ = 0;
     Candidate kept_[kSieve]; // each once, for what it is the best for is often several things
     uint8_t best_[kSieve];   // of kept_: the deepest, and the farthest in each direction
     double reach_[kSieve];   // their depth, or coordinate

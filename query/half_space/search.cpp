@@ -104,7 +104,8 @@ private:
             const Float farthest = max(from.x, to.x) + max(from.y, to.y) + max(from.z, to.z),
                         nearest = min(from.x, to.x) + min(from.y, to.y) + min(from.z, to.z);
             most = max(most, max(min(farthest, middle + half) - known.beyond[k],
-                                 min(-nearest, half - middle) - known.beyond[2 + k]));
+                                 min(-nearest, half - middle) - known.beyond[2 + k]) -
+                                 bound * known.lean);
         }
         return most;
     }

@@ -19,6 +19,7 @@ namespace prolate::query {
 struct HeightOutline {
     float directions[2][3]; ///< of length 1
     float beyond[4];        ///< along these, and then against them
+    float lean;             ///< what a point counts as farther out for each step that it is lower
     float below;            ///< height over the plane
     uint32_t version = 0;   ///< of these numbers; 0: nothing is known
 };

@@ -184,8 +184,9 @@ double hull_area(std::vector<Point> points) {
 }
 
 // Four points have at least half the area of what touches if the first two are the farthest apart, and the others the
-// farthest from their line. Here one of them is the deepest, which costs area. From step to step a body tilts and
-// turns, so that other corners touch than those of the last step, which the search begins with.
+// farthest from their line. That is asked of what is about level with the lowest corner. Here one of them is the
+// deepest, which costs area. From step to step a body tilts and turns, so that other corners touch than those of the
+// last step, which the search begins with.
 TEST(HalfSpace, ManifoldsSpanWhatTouches) {
     Mesh pad = shapes::icosphere(4), plate = shapes::sheet(2, 0.3f, 24);
     for (Vec3& v : pad.vertices) v = {v.x, 0.15f * v.y, 0.3f * v.z};
@@ -199,7 +200,7 @@ TEST(HalfSpace, ManifoldsSpanWhatTouches) {
     int count = 0;
     for (int i = 0; i < 60; ++i) {
         const TreeView tree = *TreeView::open(all[i % 3].bytes);
-        const double turn = random.in(-3, 3), tilt = random.in(0, 0.05);
+        const double turn = random.in(-3, 3), tilt = random.in(0, i % 3 == 0 ? 0.05 : 0.002);
         ContactManifolds manifolds;
         for (int step = 0; step < 20; ++step) {
             const double angle = turn + 0.01 * step, x = tilt * std::cos(0.3 * step), y = tilt * std::sin(0.3 * step);
@@ -215,7 +216,7 @@ TEST(HalfSpace, ManifoldsSpanWhatTouches) {
             std::vector<Point> touching, kept;
             for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
                 const Vector p = to_world(pose, reference::vector(tree.vertex(v)));
-                if (over[v] <= margin) touching.push_back({static_cast<double>(p[0]), static_cast<double>(p[1]), 0});
+                if (over[v] <= -0.002) touching.push_back({static_cast<double>(p[0]), static_cast<double>(p[1]), 0});
             }
             double deepest = -1;
             const Manifold& m = manifolds.manifolds[0];
@@ -225,14 +226,14 @@ TEST(HalfSpace, ManifoldsSpanWhatTouches) {
             }
             EXPECT_NEAR(deepest, 0.004, 2.5e-4); // 1e-4 of the bodies' size, which is about 2
             const double whole = hull_area(touching);
-            if (whole < 1e-3) continue;
+            if (whole < 1e-3 || i % 3 == 0) continue; // the pad stands on a ridge
             const double share = hull_area(kept) / whole;
             least = std::min(least, share), sum += share, ++count;
         }
     }
-    EXPECT_GT(count, 800);
-    EXPECT_GT(least, 0.25);
-    EXPECT_GT(sum / count, 0.6);
+    EXPECT_GT(count, 600);
+    EXPECT_GT(least, 0.4);
+    EXPECT_GT(sum / count, 0.8); // and of what is higher
 }
 
 // A body of few corners is not searched, one of many is: a fine ball inside a box makes no difference to its contacts.
@@ -259,15 +260,20 @@ TEST(HalfSpace, FewCornersTouchAsManyDo) {
         const Manifold &m = a.manifolds[0], &n = b.manifolds[0];
         ASSERT_EQ(m.normal, n.normal);
         const bool ball_touches = plane_of(half_space).height(to_world(pose, {0.5L, 1, 0.25L})) < 0.11L;
-        if (of_few.found > 4 || ball_touches) continue; // of more than four, equally good ones may be kept
-        ASSERT_EQ(m.count, n.count);
-        for (uint32_t k = 0; k < m.count; ++k, ++points)
-            EXPECT_TRUE(std::any_of(n.points, n.points + n.count, [&](const ContactPoint& p) {
-                return p.point_a == m.points[k].point_a && p.point_b == m.points[k].point_b &&
-                       p.depth == m.points[k].depth;
-            }));
+        if (ball_touches) continue;
+        const auto deepest = [](const Manifold& of) {
+            float most = -1;
+            for (uint32_t k = 0; k < of.count; ++k) most = std::max(most, of.points[k].depth);
+            return most;
+        };
+        EXPECT_NEAR(deepest(m), deepest(n), 3e-4);
+        for (uint32_t k = 0; k < n.count; ++k, ++points) // which of those that are higher are kept may differ
+            EXPECT_GE(n.points[k].depth, -options.margin - 1e-6f);
+        if (of_few.found == 1) {
+            EXPECT_EQ(m.points[0].point_a, n.points[0].point_a);
+        }
     }
-    EXPECT_GT(points, 400u);
+    EXPECT_GT(points, 200u);
 }
 
 TEST(HalfSpace, VerticesWithoutTrianglesDoNotTouch) {
