@@ -77,7 +77,7 @@ Outcome<std::vector<float>> parse_coordinates(const std::string& text, const Tre
         return Failure{kUsage, "--at " + text, std::move(what), std::move(advice)};
     };
     const auto modes = tree.deformation();
-    if (!modes) return bad("the tree does not deform", "bake it with --modes");
+    if (!modes) return bad("the tree has no modes", "bake it with --modes");
     std::vector<float> out;
     for (const char *at = text.data(), *const end = at + text.size();; ++at) {
         float number = 0;

@@ -18,7 +18,8 @@ export function posesRanges({ranges, skin}) {
 /// For every p > 0 that with the matrix (1 + p) L L^T + (1 + 1 / p) radius^2 I does.
 export function widened(l, radius) {
   const entry = (i, k) => l[3 * i] * l[3 * k] + l[3 * i + 1] * l[3 * k + 1] + l[3 * i + 2] * l[3 * k + 2];
-  const m11 = entry(0, 0), m21 = entry(1, 0), m22 = entry(1, 1), m31 = entry(2, 0), m32 = entry(2, 1), m33 = entry(2, 2);
+  const m11 = entry(0, 0), m21 = entry(1, 0), m22 = entry(1, 1), m31 = entry(2, 0), m32 = entry(2, 1),
+        m33 = entry(2, 2);
   const size = m11 + m22 + m33, flat = 1e-12 * size; // matrices of bones may flatten
   const factor = (a, b) => {
     const k11 = Math.sqrt(a * m11 + b + flat), k21 = a * m21 / k11, k31 = a * m31 / k11;
@@ -95,9 +96,9 @@ export class Player {
   constructor(deformation, axis, onPose) {
     const bones = deformation.skin?.parents.length ?? 0, modes = deformation.ranges.length;
     Object.assign(this, {onPose, phase: 0, size: modes + 3 * bones});
-    this.moves = () => [
-      ...Array.from(deformation.ranges, (range, m) => ({at: m, range})),
-      ...Array.from({length: bones}, (_, b) => ({at: modes + 3 * b + axis(), range: kSwing})),
+    this.moves = () =>
+        [...Array.from(deformation.ranges, (range, m) => ({at: m, range})),
+         ...Array.from({length: bones}, (_, b) => ({at: modes + 3 * b + axis(), range: kSwing})),
     ];
   }
 

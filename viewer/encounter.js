@@ -20,7 +20,8 @@ export class Encounter {
     encounter.queries = await Queries.start(app.scene);
     encounter.rows = app.scene.bodies.map((body) => new Map(Array.from(body.nodes.slot, (slot, row) => [slot, row])));
     element('query').hidden = false;
-    element('query-note').textContent = `Answers of prolate ${app.scene.version} itself, compiled to WebAssembly.`;
+    element('query-note').textContent = `Answers of prolate ${app.scene.version} itself, compiled to WebAssembly` +
+        (app.scene.bodies.some((body) => body.deformation) ? ', for bodies at rest.' : '.');
     element('reset-pose').addEventListener('click', () => app.resetPose());
     return encounter;
   }

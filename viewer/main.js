@@ -33,7 +33,7 @@ class App {
       colour: two  ? 'body' :
           hasInner ? 'covers' :
                      'branch',
-      coverOpacity: this.deforms && hasMesh ? 0.5 : 1, // so that the mesh is seen to move within
+      coverOpacity: this.deforms && hasMesh && !hasInner ? 0.5 : 1, // so that the mesh is seen to move within
       coverWire: false,
       meshOpacity: hasMesh ? 1 : 0,
       meshWire: false,
@@ -49,7 +49,8 @@ class App {
       hover: 0,
     });
     this.state.onChange((changed) => { // the first to hear: others ask the body
-      if (changed.includes('coordinates')) scene.bodies[0].deform(this.state.coordinates);
+      if (changed.includes('coordinates') || (changed.includes('level') && scene.bodies[0].moved))
+        scene.bodies[0].deform(this.state.coordinates, this.state.level);
     });
     this.camera = new Camera(scene.up);
     if (two) { // beside the first as one sees it, so that a drag across the picture brings them together

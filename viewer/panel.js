@@ -29,7 +29,7 @@ export class Panel {
     element('mesh-row').hidden = !hasMesh;
     const hasInner = scene.bodies.some((body) => body.inner);
     element('inner-row').hidden = !hasInner;
-    this.button('colour', 'covers').hidden = !hasInner;
+    this.button('colour', 'covers').hidden = !hasInner || scene.bodies.length > 1;
     this.button('colour', 'body').hidden = scene.bodies.length < 2;
     this.button('colour', 'outside').disabled = !hasDistances;
     if (!hasDistances)
@@ -156,6 +156,7 @@ export class Panel {
     const words = ['Each ellipsoid holds its part of the mesh, wherever these move it.'];
     if (moved && state.level < levels.length - 1) words.push('Above the last level they hold all leaves below, too.');
     if (moved && mesh && !showsMesh) words.push('To see the mesh move, name its modes: view --modes.');
+    if (moved && scene.bodies[0].inner) words.push('Its inner cover is known at rest only.');
     if (moved && state.colour === 'outside') words.push('Distances are known at rest only.');
     element('deformation-note').textContent = words.join(' ');
   }

@@ -45,20 +45,22 @@ class Body {
     this.version = 0; // another one for each change of shape
     // What the camera looks at: all but the root, which by far sticks out the most; and what it must not cut off.
     const rows = Array.from(this.nodes.slot.keys());
-    this.deform(this.deformation ? posesRanges(this.deformation).map(() => 0) : []);
+    this.deform(this.deformation ? posesRanges(this.deformation).map(() => 0) : [], 0);
     this.box = this.boxOf(rows.length > 1 ? rows.slice(1) : rows);
   }
 
-  /// Moves the body by its modes and bones: what `ellipsoid` and `vertices` hold from now on. At rest, ellipsoids are those of
-  /// the levels; else the bounds, which queries of deforming bodies ask.
-  deform(pose) {
+  /// Moves the body by its modes and bones: what `ellipsoid` and `vertices` hold from now on. At rest, ellipsoids are
+  /// those of the levels; else the bounds, which queries of deforming bodies ask, and only those of the cut at `level`:
+  /// the others would take too long where a body moves.
+  deform(pose, level) {
     const {deformation, mesh, nodes} = this;
     this.coordinates = pose;
     this.moved = pose.some((x) => x !== 0);
-    this.ellipsoid = this.moved ? movedEllipsoids(deformation, pose, nodes.slot.keys()) : nodes.ellipsoid;
+    const shown = this.moved ? this.cut(level) : Array.from(nodes.slot.keys());
+    this.ellipsoid = this.moved ? movedEllipsoids(deformation, pose, shown) : nodes.ellipsoid;
     this.showsMesh = Boolean(mesh && (!this.moved || knowsVertices(deformation, pose)));
     this.vertices = this.moved && this.showsMesh ? movedVertices(mesh.vertices, deformation, pose) : mesh?.vertices;
-    this.reach = this.boxOf(Array.from(nodes.slot.keys()));
+    this.reach = this.boxOf(shown);
     ++this.version;
   }
 
@@ -112,11 +114,11 @@ class Body {
   /// How far each ellipsoid but the root's reaches along a direction of the world: [[least, most], ...]; of a body that
   /// deforms, at the ends of each mode's range, too, those of few nodes.
   extents(direction) {
-    const {nodes, deformation, coordinates} = this,
-                               rows = Array.from(nodes.slot.keys()).slice(this.nodeCount > 1 ? 1 : 0);
+    const {nodes, deformation, coordinates} = this;
+    const rows = Array.from(nodes.slot.keys()).slice(this.nodeCount > 1 ? 1 : 0);
     const out = this.extentsOf(nodes.ellipsoid, rows, direction);
-    const level = this.levels.findLastIndex((one) => one.cut <= 64),
-          few = deformation ? this.cut(Math.max(1, level)) : [];
+    const level = Math.max(1, this.levels.findLastIndex((one) => one.cut <= 64));
+    const few = deformation ? this.cut(level) : [];
     for (const end of few.length > 0 ? [-1, 1] : [])
       for (let m = 0; m < deformation.ranges.length; ++m) {
         const q = coordinates.map((_, i) => (i === m ? end * deformation.ranges[m] : 0));

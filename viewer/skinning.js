@@ -1,8 +1,11 @@
-// How bones move a body by linear blend skinning (include/prolate/skin.hpp). A transform is {linear: nine numbers, row by
-// row, translation: three}.
+// How bones move a body by linear blend skinning (include/prolate/skin.hpp). A transform is {linear: nine numbers, row
+// by row, translation: three}.
 import {add, length, scaled, subtract} from './vector.js';
 
-const kStill = {linear: [1, 0, 0, 0, 1, 0, 0, 0, 1], translation: [0, 0, 0]};
+const kStill = {
+  linear: [1, 0, 0, 0, 1, 0, 0, 0, 1],
+  translation: [0, 0, 0]
+};
 
 const times = (a, v) => [0, 3, 6].map((r) => a[r] * v[0] + a[r + 1] * v[1] + a[r + 2] * v[2]);
 const product = (a, b) => a.map((_, i) => [0, 1, 2].reduce((sum, k) => sum + a[i - i % 3 + k] * b[3 * k + i % 3], 0));
@@ -13,7 +16,8 @@ const plus = (a, s, b) => ({
 });
 /// No less than |A v| / |v|: |A|^2 is the largest eigenvalue of A^T A, which no row sum is below.
 function norm(a) {
-  const column = (k) => [a[k], a[3 + k], a[6 + k]], entry = (i, k) => column(i).reduce((s, x, r) => s + x * column(k)[r], 0);
+  const column = (k) => [a[k], a[3 + k], a[6 + k]],
+        entry = (i, k) => column(i).reduce((s, x, r) => s + x * column(k)[r], 0);
   const rows = [0, 1, 2].map((i) => Math.abs(entry(i, 0)) + Math.abs(entry(i, 1)) + Math.abs(entry(i, 2)));
   return Math.sqrt(Math.min(Math.max(...rows), entry(0, 0) + entry(1, 1) + entry(2, 2)));
 }
@@ -21,11 +25,13 @@ function norm(a) {
 /// Turns about the axes x, y, z through `joint`, one after the other.
 function turned([x, y, z], joint) {
   const [a, b, c] = [x, y, z].map(Math.cos), [i, j, k] = [x, y, z].map(Math.sin);
-  const linear = product(product([c, -k, 0, k, c, 0, 0, 0, 1], [b, 0, j, 0, 1, 0, -j, 0, b]), [1, 0, 0, 0, a, -i, 0, i, a]);
+  const linear =
+      product(product([c, -k, 0, k, c, 0, 0, 0, 1], [b, 0, j, 0, 1, 0, -j, 0, b]), [1, 0, 0, 0, a, -i, 0, i, a]);
   return {linear, translation: subtract(joint, times(linear, joint))};
 }
 
-/// The bones' transforms where each is turned about its joint, and takes those below it along. `angles`: three for each.
+/// The bones' transforms where each is turned about its joint, and takes those below it along. `angles`: three for
+/// each.
 export function boneTransforms({parents, joints}, angles) {
   const out = [];
   const find = (bone) => {
@@ -45,7 +51,8 @@ export function skinnedNode(skin, bones, row, {center, factor, radius}, shift, s
   const influences = [];
   for (let n = skin.first[row]; n < skin.first[row + 1]; ++n) {
     const [weight, differs, x, y, z, r] = skin.influences.subarray(6 * n, 6 * n + 6);
-    influences.push({bone: bones[skin.influence_bones[n]], weight, differs, ball: add([x, y, z], shift), r: r + spread});
+    influences.push(
+        {bone: bones[skin.influence_bones[n]], weight, differs, ball: add([x, y, z], shift), r: r + spread});
   }
   const nothing = {linear: Array(9).fill(0), translation: [0, 0, 0]};
   const mean = influences.reduce((sum, of) => plus(sum, of.weight, of.bone), nothing);
@@ -73,8 +80,7 @@ export function skinnedVertices(vertices, {each, indices, weights}, bones) {
     for (let i = each * v; i < each * (v + 1); ++i) {
       if (weights[i] === 0) continue;
       const {linear: m, translation: t} = bones[indices[i]], share = weights[i] / whole;
-      for (let k = 0; k < 3; ++k)
-        out[3 * v + k] += share * (m[3 * k] * x + m[3 * k + 1] * y + m[3 * k + 2] * z + t[k]);
+      for (let k = 0; k < 3; ++k) out[3 * v + k] += share * (m[3 * k] * x + m[3 * k + 1] * y + m[3 * k + 2] * z + t[k]);
     }
   }
   return out;

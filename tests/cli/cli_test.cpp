@@ -532,7 +532,7 @@ TEST_F(Cli, BakeTakesModesFromNumpysFiles) {
     expect_failure(run({"view", tree, "--modes", u_file, "-o", file("page.html")}), 2, "--modes", "there is no mesh");
     // The same options without modes are another file.
     EXPECT_EQ(run({"bake", mesh, "-o", tree, "--ellipsoids", "1", "--quality", "fast"}).code, 0);
-    expect_failure(render({"--at", "0,0"}), 2, "--at 0,0", "the tree does not deform");
+    expect_failure(render({"--at", "0,0"}), 2, "--at 0,0", "the tree has no modes");
     EXPECT_TRUE(Json::parse(run({"info", tree, "--json"}).out)["mode_ranges"].empty());
     expect_failure(run({"verify", tree, mesh, "--modes", file("u.npy")}), 2, file("u.npy"), "does not deform");
 

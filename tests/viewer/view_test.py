@@ -181,9 +181,9 @@ class Deforming(PageTest):
     """A ball that bends and swells: whatever its coordinates, the ellipsoids hold the mesh that is shown."""
     page = "deforming.html"
     options = ("--degree", "8", "--levels", "2")
-    # The farthest vertex from the leaf ellipsoid that holds it deepest, in radial coordinates.
+    # The farthest vertex from the ellipsoid shown that holds it deepest, in radial coordinates.
     farthest = """(() => {
-        const [body] = viewer.scene.bodies, rows = body.cut(9);
+        const [body] = viewer.scene.bodies, rows = body.cut(viewer.state.level);
         let most = 0;
         for (let v = 0; v < body.vertices.length; v += 3) {
             let least = Infinity;
@@ -218,6 +218,9 @@ class Deforming(PageTest):
         for q in ((0.5, 0), (-0.5, 0.3), (0.2, -0.3), (0.01, 0.01)):
             self.deform(*q)
             self.assertLess(self.js(self.farthest), 1 + 1e-5, q)
+            self.set_slider("level", 1)
+            self.assertLess(self.js(self.farthest), 1 + 1e-5, (q, "on level 1"))
+            self.set_slider("level", 2)
             moved = self.js("Array.from(viewer.scene.bodies[0].vertices)")
             x, y, z = rest[3:6]
             for value, wanted in zip(moved[3:6], (x + 0.2 * x * q[1], y + 0.4 * x * x * q[0] - 0.1 * y * q[1],
