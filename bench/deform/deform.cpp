@@ -144,6 +144,13 @@ Tree bake(const Body& body, bool exact, const Settings& settings) {
     const char* const what = body.bones > 0 ? "bones" : "modes";
     fmt::print("{}: {} bytes without {}, {} with; {} took {:.2f} s\n", exact ? "exact" : "cover",
                built->tree.bytes().size(), what, out->bytes().size(), what, microseconds(start) * 1e-6);
+    if (const auto skin = out->view().skin()) {
+        std::vector<double> movers;
+        out->view().for_each_node([&](uint32_t node) {
+            if (out->view().is_leaf(node)) movers.push_back(skin->influence_count(node));
+        });
+        fmt::print("  {} bones move a leaf (median)\n", median(movers));
+    }
     return std::move(*out);
 }
 

@@ -37,16 +37,19 @@ Transform transform_of(const BoneMatrix& bone, double scale) {
     return out;
 }
 
+double squared(const dmat3& a) {
+    return glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]) + glm::dot(a[2], a[2]);
+}
 double frobenius(const dmat3& a) {
-    return std::sqrt(glm::dot(a[0], a[0]) + glm::dot(a[1], a[1]) + glm::dot(a[2], a[2]));
+    return std::sqrt(squared(a));
 }
 
 // No less than |A x| / |x|: |A|^2 is the largest eigenvalue of A^T A, which no row sum is below. Of rotations it is 1.
 double norm(const dmat3& a) {
-    const dmat3 s = glm::transpose(a) * a;
-    double rows = 0;
-    for (int i = 0; i < 3; ++i) rows = std::max(rows, std::abs(s[i].x) + std::abs(s[i].y) + std::abs(s[i].z));
-    return std::sqrt(std::min(rows, s[0].x + s[1].y + s[2].z));
+    const double xx = glm::dot(a[0], a[0]), yy = glm::dot(a[1], a[1]), zz = glm::dot(a[2], a[2]);
+    const double xy = std::abs(glm::dot(a[0], a[1])), yz = std::abs(glm::dot(a[1], a[2])),
+                 zx = std::abs(glm::dot(a[2], a[0]));
+    return std::sqrt(std::min(std::max({xx + xy + zx, yy + xy + yz, zz + yz + zx}), xx + yy + zz));
 }
 
 } // namespace
@@ -63,7 +66,7 @@ Bound Skinning::moved(uint32_t node, const Bound& bound, const ModeShift& by) co
     const uint32_t count = skin_.influence_count(node);
     const dvec3 c = bound.core.center;
     Transform mean;
-    double largest = 0, farthest = 0, around = 0; // of matrices, of translations, of corners from c
+    double largest = 0, farthest = 0, around = 0; // of matrices and translations, squared; of corners from c
     const auto ball = [&](const Skin::Influence& of) {
         return scale_ * dvec3(of.center[0], of.center[1], of.center[2]) + by.shift;
     };
@@ -71,12 +74,12 @@ Bound Skinning::moved(uint32_t node, const Bound& bound, const ModeShift& by) co
         const Skin::Influence of = skin_.influence(node, i);
         const Transform bone = transform_of(bones_[of.bone], scale_);
         mean.add(of.weight, bone);
-        largest = std::max(largest, frobenius(bone.linear));
-        farthest = std::max(farthest, glm::length(bone.translation));
+        largest = std::max(largest, squared(bone.linear));
+        farthest = std::max(farthest, glm::dot(bone.translation, bone.translation));
         around = std::max(around, glm::length(ball(of) - c) + scale_ * of.radius + by.spread);
     }
     double longest = 0, sum = 0, spreads = 0;
-    for (uint32_t i = 0; i < count; ++i) {
+    for (uint32_t i = 0; i < count && count > 1; ++i) { // one bone alone is exact
         const Skin::Influence of = skin_.influence(node, i);
         Transform off = transform_of(bones_[of.bone], scale_);
         off.add(-1, mean);
@@ -85,7 +88,7 @@ Bound Skinning::moved(uint32_t node, const Bound& bound, const ModeShift& by) co
         sum += of.spread * (glm::length(off(c)) + stretch * around);
         spreads += of.spread;
     }
-    const double reach = largest * (bound.core.reach + around + glm::length(by.shift)) + farthest;
+    const double reach = std::sqrt(largest) * (bound.core.reach + around + glm::length(by.shift)) + std::sqrt(farthest);
     Bound out{};
     out.radius = norm(mean.linear) * bound.radius + std::min(longest, sum) +
                  kSkinRounding * (count + kSkinRoundings) * (1 + spreads) * reach;
