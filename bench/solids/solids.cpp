@@ -10,8 +10,9 @@
 // time of that, beside distance() of exact trees, both with a tolerance of 0.1 %; and the time of contacts() of the
 // covers alone and of the solids, and what the bounds of the depth, where both are known, come to: the lower one's
 // part of the upper one. Times are processor time of the thread, means over all poses, the best of some rounds through
-// all of them: each pose is another than the one before, as in a program. Every decision and every bound is compared
-// with those of the exact trees; the program fails if one is wrong.
+// all of them: each pose is another than the one before, as in a program. Then the same of bodies of which one moves in
+// steps of a thousandth of the diagonal, with caches and without. Every decision and every bound is compared with those
+// of the exact trees; the program fails if one is wrong.
 #include "tests/scenes.hpp"
 
 #include <prolate/build.hpp>
@@ -38,6 +39,7 @@ constexpr double kBands[] = {0.01, 0.05, 0.2}; // of the diagonal
 constexpr DistanceOptions kDistance{.tolerance_relative = 1e-3};
 constexpr int kBisections = 16;
 constexpr int kRounds = 8; // through all poses, to be timed
+constexpr int kSteps = 16; // of a motion, each a thousandth of the diagonal
 
 struct Settings {
     uint32_t ellipsoids = 64, inner = 64, poses = 2000;
@@ -109,6 +111,7 @@ public:
                    100 * band, "exact", "", share(truth, Verdict::separated), share(truth, Verdict::overlapping),
                    collide_us, each(blocks, poses), collide_us, "", distance_us);
         print_levels(poses);
+        print_moving(poses);
         return right;
     }
 
@@ -141,6 +144,36 @@ private:
             fmt::print(" {:.3f} {:.2f}{}", decided / count, 100 * width / exact_->diagonal / count,
                        level + 1 < tree.level_count() ? "," : "\n");
         }
+    }
+    // The same from pose to pose of bodies that move, with a cache and without.
+    void print_moving(const std::vector<Placed>& poses) {
+        const TreeView exact = exact_->tree.view();
+        const Solid solid(covers_[0]->tree.view());
+        const auto step = static_cast<float>(1e-3 * exact_->diagonal);
+        const auto along = [&]<class Cache>(Cache*, const auto& query) { // with a cache that is empty at first
+            const auto motion = [&](const Placed& p) {
+                Cache cache;
+                Pose b = p.b;
+                uint64_t sum = 0;
+                for (int i = 0; i < kSteps; ++i, b.translation.z += step)
+                    sum += static_cast<uint64_t>(query(p.a, b, &cache));
+                return sum;
+            };
+            return time(poses, motion) / kSteps;
+        };
+        const auto of_solids = [&](const Pose& a, const Pose& b, SolidsCache* cache) {
+            return collide(solid, a, solid, b, *context_, {}, cache).verdict;
+        };
+        const auto of_exact = [&](const Pose& a, const Pose& b, PairCache* cache) {
+            return collide(exact, a, exact, b, *context_, {}, cache).verdict;
+        };
+        SolidsCache* const solids_cache = nullptr;
+        PairCache* const pair_cache = nullptr;
+        fmt::print("         moving, us: ellipsoids {:.2f}, with a cache {:.2f}; exact {:.2f}, with a cache {:.2f}\n",
+                   along(solids_cache, [&](const Pose& a, const Pose& b, auto*) { return of_solids(a, b, nullptr); }),
+                   along(solids_cache, of_solids),
+                   along(pair_cache, [&](const Pose& a, const Pose& b, auto*) { return of_exact(a, b, nullptr); }),
+                   along(pair_cache, of_exact));
     }
     // Microseconds of a call.
     template <class Query> double time(const std::vector<Placed>& poses, const Query& query) {
