@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace prolate {
@@ -150,6 +151,13 @@ void GltfRig::add_weights(const GltfValue& primitive, size_t first, size_t count
                 at.fail("a vertex names a joint that the skin does not have");
             out_.indices[to] = static_cast<uint16_t>(first_bone_ + static_cast<uint32_t>(joints[i]));
         }
+    }
+    for (size_t i = 0; i < count; ++i) { // add_skin() asks, too, but after a bake
+        const float* const row = &out_.weights[(first + i) * kMaxInfluences];
+        if (const double sum = std::accumulate(row, row + kMaxInfluences, 0.0);
+            !(std::abs(sum - 1) <= kWeightTolerance))
+            throw GltfFailure{"a vertex whose weights do not add up to 1; normalise them",
+                              attributes["WEIGHTS_0"].place() + ", row " + std::to_string(i)};
     }
 }
 

@@ -802,6 +802,10 @@ TEST_F(Import, SkinsAndMorphTargetsOfGltf) {
     refused(with(R"(,"JOINTS_0")", R"(,"OTHERS_0")"), "without joints");
     refused(with(R"(,"skin":0,"weights":[0,-2])", R"(,"skin":0,"weights":[0])"), "wrong length nodes[0].weights");
     refused(rigged_tetrahedron(weights, R"(,{"mesh":0})", "0,3"), "beside skinned ones");
+    std::vector<float> heavy = weights;
+    heavy[9] = 0.75f;
+    refused(rigged_tetrahedron(heavy), "do not add up to 1; normalise them");
+    refused(rigged_tetrahedron(heavy), "WEIGHTS_0, row 2");
     refused(quantised<int8_t>(100, 5120, false), "neither skins nor morph targets");
 }
 
