@@ -1,6 +1,8 @@
 // Determinism: the same input gives the same bits on every instruction set and from every compiler. Each kind of query
 // has a known hash of all that it answered in a few hundred scenes. A change that means to alter answers (another order
 // of the descent, say, which names another pair) puts the new number here; no other change may.
+#include "src/bytes.hpp"
+#include "src/deformation.hpp"
 #include "src/format.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/scenes.hpp"
@@ -10,6 +12,7 @@
 #include <prolate/bounds.hpp>
 #include <prolate/collide.hpp>
 #include <prolate/contacts.hpp>
+#include <prolate/deform.hpp>
 #include <prolate/distance.hpp>
 #include <prolate/half_space.hpp>
 #include <prolate/pairs.hpp>
@@ -224,6 +227,64 @@ TEST(Bits, Solids) {
         ++counts[static_cast<int>(r.verdict)];
     });
     for (const uint32_t count : counts) EXPECT_GT(count, 10u);
+}
+
+// Two modes that shift, enlarge and round nodes, and displace points, by whatever comes.
+std::vector<std::byte> with_modes(std::vector<std::byte> bytes, uint64_t seed) {
+    constexpr uint32_t kModes = 2;
+    const TreeView tree = *TreeView::open(bytes);
+    const bool exact = tree.has_triangles();
+    const uint32_t points = exact ? tree.vertex_count() : 1;
+    std::vector<std::byte> content(static_cast<size_t>(deformation_bytes(kModes, tree.slot_count(), points, exact)));
+    store_le(content.data() + kModeCount, kModes), store_le(content.data() + kPointCount, points);
+    for (size_t row = kModeRows; row < motions_begin(kModes); row += kModeRowBytes) {
+        store_le(content.data() + row + kModeRange, 0.5f);
+        for (const size_t step : {kShiftStep, kGrowthStep, kRadiusStep})
+            store_le(content.data() + row + step, 0x1p-16f);
+    }
+    Random random(seed);
+    tree.for_each_node([&](uint32_t node) {
+        for (uint32_t mode = 0; mode < kModes; ++mode) {
+            std::byte* const at =
+                content.data() + motions_begin(kModes) + (size_t{node} * kModes + mode) * kMotionBytes;
+            for (size_t i = 0; i < 3; ++i)
+                store_le(at + kShift + 2 * i, static_cast<int16_t>(static_cast<int>(random.below(20000)) - 10000));
+            store_le(at + kGrowth, static_cast<uint16_t>(random.below(6000) | random.below(2) * kIsRadius));
+        }
+    });
+    for (size_t at = static_cast<size_t>(points_begin(kModes, tree.slot_count())); at < content.size(); at += 4)
+        store_le(content.data() + at, static_cast<float>(random.in(-0.1, 0.1)));
+    format::append_section(bytes, kDeformationKind, content);
+    return bytes;
+}
+
+TEST(Bits, Deformed) {
+    std::vector<std::vector<std::byte>> bytes;
+    for (size_t i = 0; i < all_scenes().bytes.size(); ++i) bytes.push_back(with_modes(all_scenes().bytes[i], i));
+    const auto moving = [&](const TreeView& tree) { // the same with modes
+        for (size_t i = 0; i < bytes.size(); ++i)
+            if (tree.bytes().data() == all_scenes().bytes[i].data()) return *TreeView::open(bytes[i]);
+        return tree;
+    };
+    uint32_t counts[3] = {};
+    expect_bits(7810809499793290088u, [&](Bits& bits, const Scenes::Pair& p) {
+        const float q_a[] = {p.pose_a.rotation.x / 2, p.pose_a.rotation.y / 2}, q_b[] = {0, p.pose_b.rotation.z / 2};
+        const DeformedBody a{moving(p.a), p.pose_a, q_a}, b{moving(p.b), p.pose_b, q_b};
+        const DeformedCollideResult r = collide(a, b, context(), {.max_pair_tests = 20000, .margin = 0.01f});
+        bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
+        const DeformedDistanceResult d =
+            distance(a, b, context(), {.tolerance_relative = 1e-3, .max_pair_tests = 20000});
+        bits.add_all(d.verdict, d.enclosed, d.lower, d.upper, d.point_a, d.point_b, d.normal, d.pair, d.stats);
+        const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
+        const DeformedRaycastResult hit =
+            raycast(b, {from, {to.x - from.x, to.y - from.y, to.z - from.z}, 2}, context());
+        bits.add_all(hit.verdict, hit.t, hit.clear, hit.point, hit.normal, hit.node, hit.triangle, hit.stats);
+        const Bounds box = bounds(a);
+        bits.add_all(box.lower, box.upper);
+        ++counts[static_cast<int>(d.verdict)];
+    });
+    EXPECT_GT(counts[0], 50u);
+    EXPECT_GT(counts[1], 50u);
 }
 
 TEST(Bits, Sweep) {
