@@ -11,7 +11,6 @@
 
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
-#include "query/contacts/pair_contacts.hpp"
 #include "query/distance/rounded.hpp"
 #include "query/half_space/lowest.hpp"
 #include "query/half_space/search.hpp"
@@ -41,21 +40,19 @@ constexpr double kSamePoint = 1e-4;  // of the body: what is nearer is one point
 constexpr uint32_t kFewCorners = 64; // all of which cost less than the blocks of nodes above them
 // Shares of the extent that is known: what lies farther out by less is not looked for, at first and if something new
 // was found.
-constexpr double kFarther = 0x1p-4, kFartherOut = 0x1p-6;
+constexpr double kCoarseShare = 0x1p-4, kFineShare = 0x1p-6;
 
 // What a point counts as farther out for each metre that it is lower: what is level with the lowest corner counts as it
 // lies, and of what is higher that which a body that rolls soon comes down on, not what is far away. Steeper than
 // 1 : 16 a body does not turn in a step of a simulator.
 constexpr double kLean = 16;
 
-dvec3 across(const dvec3& n) {
+dvec3 beside(const dvec3& n) {
     return glm::cross(n, std::abs(n.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0));
 }
 
 // Ids name a vertex or a node, and say which: so the corners of the last query are known at once.
-uint64_t name(Part::Kind kind, uint32_t index) {
-    return uint64_t{static_cast<uint32_t>(kind)} << 32 | index;
-}
+constexpr uint64_t kVertexId = uint64_t{1} << 32, kNodeId = uint64_t{2} << 32;
 
 // All corners and ellipsoids that touch, sieved.
 class Touching {
@@ -66,7 +63,7 @@ public:
           highest_(kSeparationMargin *
                    (2 * place(search.side.tree.root_bound(), search.side.tree.scale()).reach + touched_.reach)),
           same_point(kSamePoint * place(search.side.tree.root(), search.side.tree.scale()).size),
-          patch(-search.shape.normal, across(search.shape.normal), kLean) {}
+          patch(-search.shape.normal, beside(search.shape.normal), kLean) {}
 
     void find() {
         if (take_all()) return;
@@ -82,7 +79,7 @@ public:
         search();
         if (!news_ || s_.open < HUGE_VAL) return;
         const uint64_t once = found;
-        farther_ = kFartherOut;
+        farther_ = kFineShare;
         search();
         found = once;
     }
@@ -124,7 +121,7 @@ private:
             for (const uint32_t v : tree.triangle(t)) used |= uint64_t{1} << v;
         for (touch &= used; touch != 0; touch &= touch - 1) {
             const auto v = static_cast<uint32_t>(std::countr_zero(touch));
-            add(at[v], name(Part::Kind::vertex, v));
+            add(at[v], kVertexId | v);
         }
         return true;
     }
@@ -134,7 +131,7 @@ private:
         if (s_.side.limit_from != UINT32_MAX) return; // nodes stand for corners
         last_.for_each_id([&](uint64_t id) {
             const auto v = static_cast<uint32_t>(id);
-            if (v >= tree.vertex_count() || id != name(Part::Kind::vertex, v)) return;
+            if (v >= tree.vertex_count() || id != (kVertexId | v)) return;
             const dvec3 p = position(tree, v);
             if (height(p, touched_) <= surely_) add(p, id);
         });
@@ -167,7 +164,7 @@ private:
         s_.stats.triangle_tests += std::max(range.count, 1u);
         if (range.count == 0) {
             const PlacedEllipsoid e = place(tree.bound(slot), tree.scale());
-            if (!separated(e, touched_)) add(lowest_point(e, s_.shape.normal), name(Part::Kind::node, slot));
+            if (!separated(e, touched_)) add(lowest_point(e, s_.shape.normal), kNodeId | slot);
         }
         for (uint32_t t = range.first; t < range.first + range.count; ++t) {
             const Triangle corners = tree.triangle(t);
@@ -183,7 +180,7 @@ private:
                     if (over > *rounding) continue;
                 }
                 seen = v;
-                add(p, name(Part::Kind::vertex, v));
+                add(p, kVertexId | v);
             }
         }
         return true;
@@ -233,7 +230,7 @@ private:
         return false;
     }
 
-    double farther_ = kFarther;
+    double farther_ = kCoarseShare;
     bool news_ = false; // since the known
     // What is of interest lies deeper, or along ways_ and against them farther out than this.
     double below_ = 0, beyond_[4] = {};
