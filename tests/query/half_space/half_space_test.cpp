@@ -236,6 +236,30 @@ TEST(HalfSpace, ManifoldsSpanWhatTouches) {
     EXPECT_GT(sum / count, 0.8); // and of what is higher
 }
 
+// With a large margin, points that are far away and high above do not take the places of those that a tilted ring rolls
+// onto next.
+TEST(HalfSpace, RoundBodiesTouchNearTheirLowestPoint) {
+    const scenes::ExactScene scene = scenes::exact_tree(shapes::torus(1, 0.3f, 50, 50));
+    const TreeView tree = *TreeView::open(scene.bytes);
+    Random random(32);
+    const auto context = std::make_unique<QueryContext>();
+    const HalfSpace ground{{0, 0, 1}, 0};
+    for (int i = 0; i < 50; ++i) {
+        const double tilt = random.in(0.2, 1.2), turn = random.in(-3, 3);
+        Pose pose{{},
+                  {static_cast<float>(std::sin(tilt / 2) * std::cos(turn)),
+                   static_cast<float>(std::sin(tilt / 2) * std::sin(turn)), 0, static_cast<float>(std::cos(tilt / 2))}};
+        const std::vector<Real> over = heights(tree, pose, plane_of(ground));
+        pose.translation.z = -static_cast<float>(*std::min_element(over.begin(), over.end()));
+        ContactManifolds manifolds;
+        contacts(tree, pose, ground, manifolds, *context, {.margin = 0.3f});
+        ASSERT_EQ(manifolds.count, 1u);
+        const Manifold& m = manifolds.manifolds[0];
+        EXPECT_GE(m.count, 3u);
+        for (uint32_t k = 0; k < m.count; ++k) EXPECT_GT(m.points[k].depth, -0.05f);
+    }
+}
+
 // A body of few corners is not searched, one of many is: a fine ball inside a box makes no difference to its contacts.
 TEST(HalfSpace, FewCornersTouchAsManyDo) {
     const Mesh box = shapes::box(1, 2, 0.5f);
