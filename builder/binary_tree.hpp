@@ -5,10 +5,12 @@
 
 #include <prolate/mesh.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -16,32 +18,40 @@ namespace prolate {
 
 inline constexpr uint32_t kParallelAbove = 512; ///< triangles of a node whose children are worth tasks of their own
 
-/// Of points along the axes and face diagonals.
-struct Extents {
-    static constexpr size_t kDirections = 9;
-    std::array<float, kDirections> low, high;
-
-    Extents() { low.fill(HUGE_VALF), high.fill(-HUGE_VALF); }
+/// How far points reach along the axes and the face diagonals: loops over lanes, which compilers vectorise.
+class Extents {
+public:
+    Extents() { reach_.fill(-HUGE_VALF), reach_[kUnused] = reach_[kDown + kUnused] = 0; }
     void add(const Vec3& p) {
         const float heights[] = {p.x, p.y, p.z, p.x + p.y, p.x - p.y, p.y + p.z, p.y - p.z, p.z + p.x, p.z - p.x};
-        for (size_t d = 0; d < kDirections; ++d)
-            low[d] = std::min(low[d], heights[d]), high[d] = std::max(high[d], heights[d]);
+        for (size_t d = 0; d < std::size(heights); ++d) {
+            reach_[d] = std::max(reach_[d], heights[d]);
+            reach_[kDown + d] = std::max(reach_[kDown + d], -heights[d]);
+        }
     }
     void add(const Extents& e) {
-        for (size_t d = 0; d < kDirections; ++d)
-            low[d] = std::min(low[d], e.low[d]), high[d] = std::max(high[d], e.high[d]);
+        for (size_t i = 0; i < reach_.size(); ++i) reach_[i] = reach_[i] < e.reach_[i] ? e.reach_[i] : reach_[i];
     }
-    Vec center() const { return {0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])}; }
+    Vec center() const { return {middle(0), middle(1), middle(2)}; }
     double squared_width() const {
-        double straight = 0, diagonal = 0;
-        for (size_t d = 0; d < kDirections; ++d) (d < 3 ? straight : diagonal) += double{high[d]} - low[d];
-        const double width = straight + std::numbers::sqrt2 / 2 * diagonal;
+        constexpr float kDiagonal = std::numbers::sqrt2_v<float> / 2;
+        constexpr float kWeight[8] = {1, 1, 1, kDiagonal, kDiagonal, kDiagonal, kDiagonal, kDiagonal};
+        const auto extent = [this](size_t d) { return reach_[d] + reach_[kDown + d]; };
+        float sum[4];
+        for (size_t d = 0; d < 4; ++d) sum[d] = kWeight[d] * extent(d) + kWeight[4 + d] * extent(4 + d);
+        const double width = double{sum[0] + sum[1]} + (sum[2] + sum[3]) + kDiagonal * extent(8);
         return width * width;
     }
+
+private:
+    static constexpr size_t kUnused = 9, kDown = 10; // up along each direction first, then down, as negative numbers
+    double middle(size_t d) const { return 0.5 * (double{reach_[d]} - reach_[kDown + d]); }
+
+    std::array<float, 20> reach_;
 };
 
 /// Made in parallel, and the same for any number of threads. O(n log n) time, O(n) memory. A part is split in two
-/// through the order of the boxes' centers along an axis, world or principal, where it makes the sum of costs least:
+/// through the order of the boxes' centers along an axis, principal or world, where it makes the sum of costs least:
 ///
 ///     cost = n w^2,   w = mean width of the part in the 3 directions of the axes and the 6 of their face diagonals
 ///
@@ -74,28 +84,14 @@ public:
     }
 
 private:
-    // Where to cut a part in the order along an axis.
-    struct Cut {
-        double cost = HUGE_VAL; // of both sides together
-        uint32_t left = 0;      // triangles on the lower side; 0: no cut found
-    };
-    struct Group {
-        Extents extents;
-        uint32_t triangles = 0;
-    };
-    using Key = std::pair<double, uint32_t>; // height of a triangle and its index: a total order
-
-    std::vector<Key> keys(const Part& p, const Vec& axis) const;
-    static Cut best_cut(std::span<const Group> groups);
-    Cut cut_sorted(const Part& p, const Vec& axis) const;
-    Cut cut_binned(const Part& p, const Vec& axis) const;
-    std::array<Vec, 3> principal_axes(const Part& p) const;
-    uint32_t cut(const Part& p, uint64_t most);
+    uint32_t cut_sorted(const Part& p, uint64_t most);
+    uint32_t cut_binned(const Part& p, uint64_t most);
+    void reorder(const Part& p, std::span<const uint32_t> from);
     Extents split(uint32_t index, const Part& p, uint32_t levels);
 
     const std::function<void()> report_;
-    std::vector<Extents> extents_; // of each triangle
     std::vector<uint32_t> order_;  // of the triangles: a node's are consecutive
+    std::vector<Extents> extents_; // of the triangles, in this order
     std::vector<Node> nodes_;
 };
 
