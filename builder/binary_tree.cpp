@@ -65,8 +65,12 @@ public:
         const Matrix3 v = eigen_symmetric(covariance).vectors; // columns
         for (size_t k = 0; k < 3; ++k)
             axes_[k] = {static_cast<float>(v[0][k]), static_cast<float>(v[1][k]), static_cast<float>(v[2][k])};
+        for (size_t k = 0; k < 3; ++k)
+            for (size_t r = 0; r < 3; ++r) {
+                const float first = axes_[k][r], second = axes_[(k + 1) % 3][r];
+                axes_[6 + 2 * k][r] = first + second, axes_[7 + 2 * k][r] = first - second;
+            }
     }
-    static constexpr size_t kAxes = 6;
     void heights(size_t axis, std::span<float> out) const {
         const auto [x, y, z] = axes_[axis];
         for (size_t i = 0; i < size_; ++i) out[i] = (x * at_[0][i] + y * at_[1][i]) + z * at_[2][i];
@@ -75,7 +79,7 @@ public:
 private:
     size_t size_;
     std::array<std::span<float>, 3> at_;
-    std::array<std::array<float, 3>, kAxes> axes_{{{}, {}, {}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    std::array<std::array<float, 3>, BinaryTree::kMostAxes> axes_{{{}, {}, {}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 };
 
 // The height of a triangle in the upper half, as a number that grows with it, and its place: a total order.
@@ -105,7 +109,8 @@ struct Bins {
 
 } // namespace
 
-BinaryTree::BinaryTree(MeshView mesh, std::function<void()> report) : report_(std::move(report)) {
+BinaryTree::BinaryTree(MeshView mesh, size_t axes, std::function<void()> report)
+    : axes_(axes), report_(std::move(report)) {
     const auto count = static_cast<uint32_t>(mesh.triangles.size());
     extents_.resize(count), order_.resize(count), nodes_.resize(2 * size_t{count} - 1);
     std::iota(order_.begin(), order_.end(), 0u);
@@ -133,7 +138,7 @@ uint32_t BinaryTree::cut_sorted(const Part& p, uint64_t most) {
     const Centers centers(extents, scratch);
     std::array<uint64_t, kSortedBelow> keys, longest, chosen;
     Cut best;
-    for (size_t axis = 0; axis < Centers::kAxes; ++axis) {
+    for (size_t axis = 0; axis < axes_; ++axis) {
         std::array<float, kSortedBelow> heights;
         std::array<double, kSortedBelow> right;
         centers.heights(axis, std::span(heights).first(size));
@@ -158,7 +163,7 @@ uint32_t BinaryTree::cut_binned(const Part& p, uint64_t most) {
     const std::span<const Extents> extents = std::span(extents_).subspan(p.begin, size);
     std::vector<float> scratch(3 * size_t{size});
     const Centers centers(extents, scratch);
-    std::array<Cut, Centers::kAxes> cuts;
+    std::array<Cut, kMostAxes> cuts;
     const auto try_axis = [&](size_t axis) {
         std::vector<float> heights(size);
         centers.heights(axis, heights);
@@ -177,9 +182,9 @@ uint32_t BinaryTree::cut_binned(const Part& p, uint64_t most) {
             [&](size_t g) { return sizes[g]; });
     };
     if (size > kParallelAbove)
-        parallel_for(size_t{0}, cuts.size(), try_axis);
+        parallel_for(size_t{0}, axes_, try_axis);
     else
-        for (size_t a = 0; a < cuts.size(); ++a) try_axis(a);
+        for (size_t a = 0; a < axes_; ++a) try_axis(a);
     const auto cheapest = std::min_element(
         cuts.begin(), cuts.end(), [](const Cut& x, const Cut& y) { return x.cost < y.cost; }); // first of equals
     std::vector<float> heights(size);

@@ -59,6 +59,7 @@ private:
 /// Salmon 1987), and a nearly round body's surface with its mean width squared; running widths cost nothing.
 class BinaryTree {
 public:
+    static constexpr size_t kMostAxes = 12;
     struct Part {
         uint32_t begin, end; ///< of the order of triangles
         uint32_t size() const { return end - begin; }
@@ -71,9 +72,10 @@ public:
         double squared_width = 0; ///< of its Extents
     };
 
-    /// At most 2^(kMaxLevels - 1) triangles, so that it has no more levels than a file may have. `report` is called,
-    /// from many threads, for each triangle that is come down to.
-    BinaryTree(MeshView mesh, std::function<void()> report);
+    /// Tries the first `axes` of up to kMostAxes: the principal ones, longest first, the world's, and the diagonals of
+    /// the principal ones. At most 2^(kMaxLevels - 1) triangles, so that it has no more levels than a file may have.
+    /// `report` is called, from many threads, for each triangle that is come down to.
+    BinaryTree(MeshView mesh, size_t axes, std::function<void()> report);
 
     std::span<const Node> nodes() const { return nodes_; }
     static uint32_t left_of(uint32_t node) { return node + 1; }
@@ -89,6 +91,7 @@ private:
     void reorder(const Part& p, std::span<const uint32_t> from);
     Extents split(uint32_t index, const Part& p, uint32_t levels);
 
+    const size_t axes_;
     const std::function<void()> report_;
     std::vector<uint32_t> order_;  // of the triangles: a node's are consecutive
     std::vector<Extents> extents_; // of the triangles, in this order

@@ -30,6 +30,7 @@ namespace prolate {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+constexpr int kColumns = 512; // across, to measure solids by
 
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
@@ -77,7 +78,7 @@ private:
         Pieces pieces = cut_pieces(mesh_, closed(), winding, expected_leaves(options_), resolution_,
                                    [this] { report("voxelise", 0.01, 0); });
         report("voxelise", 0.04, 0);
-        const Columns columns = measure_solid(winding);
+        const Columns columns = measure_solid(&winding, kColumns);
         if (auto possible = check(columns); !possible) return possible.error();
 
         report("fit", 0.05, 1);
@@ -93,13 +94,17 @@ private:
     // Split the triangles, bound them, prove.
     Result<Build> bake_exact() {
         report("measure", 0, 0);
-        if (closed()) measure_solid(Winding(mesh_)); // of an open one it takes very long, and nobody needs it
+        // Of an open one it takes very long, and nobody needs it. A few columns tell whether parts of a closed one
+        // overlap.
+        if (closed() && measure_solid(nullptr, kColumns / 2).winding_defect() > 0) measure_solid(nullptr, kColumns);
         report("split", 0.1, 1);
+        const ExactEffort exact = exact_effort_of(options_.quality);
         const auto grown =
             grow_exact(mesh_, {.degree = options_.degree,
                                .leaf_triangles = options_.leaf_triangles,
                                .min_radius = min_radius(),
                                .margin = report_.weld_distance,
+                               .effort = exact,
                                .progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); }});
         if (!grown) return grown.error();
         std::vector<std::byte> bytes =
@@ -107,7 +112,7 @@ private:
         report("hulls", 0.85, 0);
         const auto without_hulls = TreeView::open(bytes, {.check_hash = false}); // Tree::open() checks the whole
         if (!without_hulls) return without_hulls.error();
-        format::store_hulls(bytes, hulls_of(*without_hulls));
+        format::store_hulls(bytes, hulls_of(*without_hulls, exact));
 
         std::vector<LevelReport> figures(grown->levels.size()); // of a cover of the surface alone: none but these
         for (uint32_t l = 0; l < figures.size(); ++l)
@@ -158,14 +163,14 @@ private:
     }
 
     // Sets the solid's volume and mass properties, unless it is too small to be one.
-    Columns measure_solid(const Winding& winding) {
-        // A solid of less than this share of its diagonal's cube has no inside worth the name.
-        constexpr double kNoInside = 1e-12;
-        constexpr int kColumns = 512; // across
-        Columns columns = measuring_columns(mesh_, closed(), winding, kColumns);
+    Columns measure_solid(const Winding* winding, int columns_across) {
+        constexpr double kNoInside = 1e-12; // of the diagonal's cube: less has no inside worth the name
+        Columns columns = measuring_columns(mesh_, closed(), winding, columns_across);
         const Quadrature solid = columns.volume();
-        if (solid.value > kNoInside * std::pow(box_.size().norm(), 3))
-            solid_ = solid, mass_ = mass_of(mesh_, closed(), columns);
+        if (!(solid.value > kNoInside * std::pow(box_.size().norm(), 3))) return columns;
+        mass_ = mass_of(mesh_, closed(), columns);
+        const bool integrated = options_.exact && mass_.volume > 0; // else what covers are compared with
+        solid_ = integrated ? Quadrature{mass_.volume, mass_.volume_error} : solid;
         return columns;
     }
 
@@ -197,10 +202,10 @@ private:
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 
     Grown grow_tree(Pieces& pieces, const Winding& winding) {
-        constexpr int kColumns = 192; // across, to compare covers by: fewer than to measure them
+        constexpr int kFewColumns = 192; // across, to compare covers by: fewer than to measure them
         const DistanceField field(mesh_, closed(), winding, field_resolution(resolution_));
         const Voxels cells = start_cells(mesh_, closed(), winding, expected_leaves(options_), resolution_);
-        const Columns columns = measuring_columns(mesh_, closed(), winding, kColumns);
+        const Columns columns = measuring_columns(mesh_, closed(), &winding, kFewColumns);
         const auto exact = [&winding](const Fit& fit) { return outside_volume(fit, inside_volume(fit, winding)); };
         const auto distance = [&](std::span<const Ellipsoid> cover) {
             const HausdorffDistance found = hausdorff_distance(cover, winding, closed(), distance_tolerance(), 1);

@@ -1,5 +1,6 @@
 #include "builder/columns.hpp"
 
+#include "builder/crossings.hpp"
 #include "builder/job.hpp"
 
 #include <algorithm>
@@ -13,59 +14,6 @@ constexpr ColumnLattice kTurned{0, 0, 1, 1, 0, 0, 0.85065080835203993, 0.5257311
 
 // Columns that meet ellipsoids to be measured, at most: times the solid's, and so many more for each ellipsoid.
 constexpr double kMostColumns = 16, kMostColumnsEach = 1 << 12;
-
-struct Crossing {
-    double z;
-    int sign; // +1: going up enters (normal points down)
-};
-
-// Sign of the area of (a, b, p) in the xy-plane. The same edge gives exactly opposite values from its two triangles,
-// and never zero: a point on an edge is moved by a symbolic step in +x, then +y, so that every column lies in exactly
-// one of the triangles around an edge or vertex.
-int side(const Vec& a, const Vec& b, double x, double y) {
-    const bool swap = b.x() < a.x() || (b.x() == a.x() && b.y() < a.y());
-    const Vec &p = swap ? b : a, &q = swap ? a : b;
-    const double area = (q.x() - p.x()) * (y - p.y()) - (q.y() - p.y()) * (x - p.x());
-    int sign = area > 0 ? 1 : area < 0 ? -1 : 0;
-    if (sign == 0) sign = q.y() > p.y() ? -1 : q.y() < p.y() ? 1 : q.x() > p.x() ? 1 : -1;
-    return swap ? -sign : sign;
-}
-
-// Lattice indices with low <= x0 + i * pitch <= high, one wider for safety, clamped.
-std::pair<int, int> index_range(double low, double high, double x0, double pitch, int n) {
-    const double first = std::floor((low - x0) / pitch), last = std::ceil((high - x0) / pitch);
-    return {static_cast<int>(std::clamp(first, 0.0, double(n))), static_cast<int>(std::clamp(last, -1.0, n - 1.0))};
-}
-
-template <class Visit> void for_each_crossing(MeshView mesh, const ColumnLattice& lattice, Visit&& visit) {
-    Checkpoints checkpoints;
-    const auto corner = [&](uint32_t v) { return lattice.to_frame(to_vec(mesh.vertices[v])); };
-    for (const Triangle& t : mesh.triangles) {
-        checkpoints();
-        const Vec a = corner(t[0]), b = corner(t[1]), c = corner(t[2]);
-        const auto [i0, i1] = index_range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), lattice.x0,
-                                          lattice.dx, lattice.nx);
-        const auto [j0, j1] = index_range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), lattice.y0,
-                                          lattice.dy, lattice.ny);
-        const double area = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
-        const double z_low = std::min({a.z(), b.z(), c.z()}), z_high = std::max({a.z(), b.z(), c.z()});
-        for (int i = i0; i <= i1; ++i)
-            for (int j = j0; j <= j1; ++j) {
-                const double x = lattice.x0 + i * lattice.dx, y = lattice.y0 + j * lattice.dy;
-                const int s = side(a, b, x, y);
-                if (side(b, c, x, y) != s || side(c, a, x, y) != s) continue;
-                double z = z_low;
-                if (area != 0) {
-                    const double u = ((x - a.x()) * (c.y() - a.y()) - (y - a.y()) * (c.x() - a.x())) / area;
-                    const double v = ((b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x())) / area;
-                    z = std::clamp(a.z() + u * (b.z() - a.z()) + v * (c.z() - a.z()), z_low, z_high);
-                }
-                // Counter-clockwise from above: the normal points up, so that a ray going up leaves here.
-                visit(static_cast<size_t>(i) * static_cast<size_t>(lattice.ny) + static_cast<size_t>(j),
-                      Crossing{z, -s});
-            }
-    }
-}
 
 // A sum over columns, for each of the four interleaved lattices by itself.
 class Sum {
@@ -132,18 +80,34 @@ private:
     std::array<Sum, kMonomials> sums_;
 };
 
+// Signs that do not (an open mesh; a column within rounding of a vertex) cannot be counted.
+bool adds_up(std::span<const Crossing> column) {
+    int depth = 0;
+    for (const Crossing& crossing : column) depth += crossing.sign;
+    return depth == 0 || column.size() < 2; // of one, there is nothing to count
+}
+
 } // namespace
 
-Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const ColumnLattice& lattice) : lattice_(lattice) {
-    // Crossings of all columns, in one array, by counting first.
+Columns::Columns(MeshView mesh, bool closed, const Winding* winding, const ColumnLattice& lattice) : lattice_(lattice) {
+    // Crossings of all columns, in one array.
     const size_t count = static_cast<size_t>(lattice.nx) * static_cast<size_t>(lattice.ny);
     std::vector<size_t> crossing_begin(count + 1, 0);
-    for_each_crossing(mesh, lattice, [&](size_t column, const Crossing&) { ++crossing_begin[column + 1]; });
+    std::vector<std::pair<size_t, Crossing>> found;
+    for_each_crossing(mesh, lattice, [&](size_t column, const Crossing& crossing) {
+        ++crossing_begin[column + 1];
+        found.emplace_back(column, crossing);
+    });
     for (size_t c = 0; c < count; ++c) crossing_begin[c + 1] += crossing_begin[c];
-    std::vector<Crossing> crossings(crossing_begin[count]);
+    std::vector<Crossing> crossings(found.size());
     std::vector<size_t> fill(crossing_begin.begin(), crossing_begin.end() - 1);
-    for_each_crossing(mesh, lattice,
-                      [&](size_t column, const Crossing& crossing) { crossings[fill[column]++] = crossing; });
+    for (const auto& [column, crossing] : found) crossings[fill[column]++] = crossing;
+    const auto crossings_of = [&](size_t c) {
+        return std::span(crossings).subspan(crossing_begin[c], crossing_begin[c + 1] - crossing_begin[c]);
+    };
+    std::optional<Winding> own_winding;
+    for (size_t c = 0; winding == nullptr && c < count; ++c)
+        if (!closed || !adds_up(crossings_of(c))) winding = &own_winding.emplace(mesh);
 
     std::vector<std::vector<Interval>> rows(static_cast<size_t>(lattice.nx));
     std::vector<size_t> interval_count(count + 1, 0);
@@ -152,24 +116,18 @@ Columns::Columns(MeshView mesh, bool closed, const Winding& winding, const Colum
         std::vector<Interval>& row = rows[static_cast<size_t>(i)];
         for (int j = 0; j < lattice.ny; ++j) {
             const size_t c = static_cast<size_t>(i) * static_cast<size_t>(lattice.ny) + static_cast<size_t>(j);
-            const std::span<Crossing> own(crossings.data() + crossing_begin[c],
-                                          crossing_begin[c + 1] - crossing_begin[c]);
+            const std::span<Crossing> own = crossings_of(c);
             std::sort(own.begin(), own.end(),
                       [](const Crossing& s, const Crossing& t) { return s.z != t.z ? s.z < t.z : s.sign > t.sign; });
             const size_t first = row.size();
-            // Signs that do not add up (an open mesh; a column within rounding of a vertex) cannot be counted.
+            const bool countable = closed && adds_up(own);
             int depth = 0;
-            for (const Crossing& crossing : own) depth += crossing.sign;
-            const bool countable = closed && depth == 0;
             for (size_t k = 0; k + 1 < own.size(); ++k) {
                 depth += own[k].sign;
                 const double low = own[k].z, high = own[k + 1].z;
                 if (!(low < high)) continue;
-                double number = depth;
-                if (!countable) {
-                    const Vec middle(lattice.x0 + i * lattice.dx, lattice.y0 + j * lattice.dy, 0.5 * (low + high));
-                    number = winding(lattice.from_frame(middle));
-                }
+                const Vec middle(lattice.x0 + i * lattice.dx, lattice.y0 + j * lattice.dy, 0.5 * (low + high));
+                const double number = countable ? depth : (*winding)(lattice.from_frame(middle));
                 if (std::abs(number) < 0.5) continue;
                 if (const double excess = std::round(number) - 1; excess != 0)
                     excesses[static_cast<size_t>(i)].push_back({i, j, {low, high}, excess});
@@ -212,7 +170,7 @@ Moments Columns::excess(const Vec& origin) const {
     return sums.total();
 }
 
-Columns measuring_columns(MeshView mesh, bool closed, const Winding& winding, int columns_across) {
+Columns measuring_columns(MeshView mesh, bool closed, const Winding* winding, int columns_across) {
     Box box;
     for (const Vec3& v : mesh.vertices) box.add(kTurned.to_frame(to_vec(v)));
     return {mesh, closed, winding, measuring_lattice(box, columns_across)};

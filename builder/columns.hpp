@@ -50,7 +50,8 @@ class Columns {
 public:
     /// Casts the columns. The solid is where |winding number| >= 1/2: an inverted shell is solid too. For a closed
     /// mesh the winding number is counted along the column, for an open one it is `winding` halfway between crossings.
-    Columns(MeshView mesh, bool closed, const Winding& winding, const ColumnLattice& lattice);
+    /// Of a closed one, `winding` is needed only for columns within rounding of a vertex; if null, it is made for them.
+    Columns(MeshView mesh, bool closed, const Winding* winding, const ColumnLattice& lattice);
 
     /// Solid intervals of column (i, j), disjoint, in rising order.
     std::span<const Interval> column(int i, int j) const {
@@ -87,7 +88,7 @@ private:
 /// About columns_across^2 columns over the mesh, to measure with: a lattice of their own, so that figures are not read
 /// off the grid that was optimised. It is turned by an angle that the walls of no ordinary model have: a wall along a
 /// lattice would fall between two rows of it, and all of it to one side.
-Columns measuring_columns(MeshView mesh, bool closed, const Winding& winding, int columns_across);
+Columns measuring_columns(MeshView mesh, bool closed, const Winding* winding, int columns_across);
 
 /// Volumes of a union of ellipsoids against the solid.
 struct CoverVolume {

@@ -85,7 +85,7 @@ void DistanceField::propagate() {
 }
 
 void DistanceField::sign(MeshView mesh, bool closed, const Winding& winding) {
-    const Columns columns(mesh, closed, winding, {origin_.x(), origin_.y(), pitch_, pitch_, size_[0], size_[1]});
+    const Columns columns(mesh, closed, &winding, {origin_.x(), origin_.y(), pitch_, pitch_, size_[0], size_[1]});
     for (int i = 0; i < size_[0]; ++i)
         for (int j = 0; j < size_[1]; ++j)
             for (const Interval& solid : columns.column(i, j)) {

@@ -3,6 +3,7 @@
 
 #include <prolate/tree.hpp>
 
+#include <cstddef>
 #include <cstdint>
 
 namespace prolate {
@@ -39,6 +40,25 @@ constexpr Effort effort_of(Quality quality) {
         break;
     }
     return {192, best, {3, 1500, 2, 1, 12, 0.05}, {3, 4000, 0, 2, 20, 0.05}, 1e-4, 32000};
+}
+
+/// How an exact tree is looked for.
+struct ExactEffort {
+    size_t axes;            ///< along which a part of the binary tree may be cut: see BinaryTree
+    size_t hull_directions; ///< of which the extreme corners are candidates for a hull's points; 0: all corners are
+    double tolerance;       ///< of inner ellipsoids' radii
+};
+
+constexpr ExactEffort exact_effort_of(Quality quality) {
+    switch (quality) {
+    case Quality::fast:
+        return {3, 24, 1e-2};
+    case Quality::normal:
+        return {6, 48, 1e-3};
+    case Quality::best:
+        break;
+    }
+    return {12, 48, 1e-4};
 }
 
 } // namespace prolate

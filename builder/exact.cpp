@@ -18,6 +18,7 @@
 #include "builder/exact.hpp"
 
 #include "builder/binary_tree.hpp"
+#include "builder/corners_by_use.hpp"
 #include "builder/cover.hpp"
 #include "builder/fit.hpp"
 #include "builder/job.hpp"
@@ -35,8 +36,9 @@ namespace {
 // Of a query at a leaf, and for each of its triangles; in tests of a block of children. Pairs of triangles are tested
 // eight at a time, so that a leaf of several costs little more than one of a single triangle.
 constexpr double kLeafCost = 0.7, kTriangleCost = 0.3;
-constexpr int kRefits = 6;            // of refitting a node
-constexpr double kOutside = 1 + 2e-3; // squared radial coordinate from which a point calls for a refit
+constexpr int kRefits = 6; // of refitting a node
+constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr double kLeafTolerance = 1e-2; // of the ellipsoids' radii: there are many leaves, and little lies below them
 
 // What becomes of a binary node.
 struct Opening {
@@ -72,7 +74,8 @@ std::vector<Vec> without_repeats(std::span<const Vec> points) {
 class ExactTreeBuilder {
 public:
     ExactTreeBuilder(MeshView mesh, const ExactOptions& options)
-        : mesh_(mesh), options_(options), binary_(mesh, [this] { report(1); }), openings_(binary_.nodes().size()) {
+        : mesh_(mesh), options_(options), binary_(mesh, options.effort.axes, [this] { report(1); }),
+          corners_(in_order(), mesh.vertices), openings_(binary_.nodes().size()) {
         Box box;
         for (const Vec3& v : mesh.vertices) box.add(to_vec(v));
         lattice_ = format::lattice_for(box.low.data(), box.high.data());
@@ -92,6 +95,11 @@ public:
 private:
     // ---- from the binary tree to the wide one ----
 
+    std::vector<Triangle> in_order() const {
+        std::vector<Triangle> out;
+        for (const uint32_t t : binary_.triangles(0)) out.push_back(mesh_.triangles[t]);
+        return out;
+    }
     uint32_t size_of(uint32_t index) const { return binary_.nodes()[index].part.size(); }
     uint32_t most_lanes(uint32_t index) const { return std::min(options_.degree, size_of(index)); }
 
@@ -147,11 +155,6 @@ private:
 
     // ---- nodes ----
 
-    template <class Visit> void for_each_corner(const Node& node, Visit&& visit) const {
-        for (const uint32_t t : binary_.triangles(node.binary))
-            for (const uint32_t v : mesh_.triangles[t]) visit(to_vec(mesh_.vertices[v]));
-    }
-
     // Makes all below `node`, and `sketch` that of its corners.
     void grow(Node& node, Sketch& sketch) {
         checkpoint();
@@ -159,9 +162,6 @@ private:
         const uint32_t size = size_of(node.binary);
         if (opening.lanes == 0) {
             node.packed.triangle_count = static_cast<uint8_t>(size);
-            std::vector<Vec> corners;
-            for_each_corner(node, [&](const Vec& p) { corners.push_back(p); });
-            sketch.add(corners);
             report(size);
         } else {
             add_siblings(node.children, BinaryTree::left_of(node.binary), opening.left_lanes);
@@ -175,39 +175,40 @@ private:
                 for (size_t c = 0; c < sketches.size(); ++c) grow_child(c);
             for (const Sketch& s : sketches) sketch.add(s);
         }
-        cover(node, sketch);
+        const BinaryTree::Part part = binary_.nodes()[node.binary].part;
+        const std::vector<Vec> corners = corners_.of(part.begin, part.end);
+        if (opening.lanes == 0) sketch.add(corners);
+        cover(node, corners, sketch);
     }
 
-    // The node's ellipsoid.
-    void cover(Node& node, const Sketch& sketch) {
+    // The node's ellipsoid and box.
+    void cover(Node& node, std::span<const Vec> corners, const Sketch& sketch) {
         checkpoint();
-        std::vector<Vec> core(sketch.points().begin(), sketch.points().end());
-        if (core.size() > 3 * size_t{size_of(node.binary)}) {
-            core.clear();
-            for_each_corner(node, [&](const Vec& p) { core.push_back(p); });
-        }
-        core = without_repeats(core);
+        const bool few = corners.size() < sketch.points().size();
+        std::vector<Vec> core = few ? std::vector(corners.begin(), corners.end()) : without_repeats(sketch.points());
+        const double tolerance = node.packed.child_count == 0 ? kLeafTolerance : options_.effort.tolerance;
+        const double outside = 1 + 2 * tolerance; // squared radial coordinate from which a point calls for a refit
         Fit fit;
         for (int round = 0; round < kRefits; ++round) {
-            fit = enclosing_ellipsoid(core, options_.min_radius);
+            fit = enclosing_ellipsoid(core, options_.min_radius, tolerance);
             // In each octant of the unit ball, the point that sticks out most joins the core.
             std::array<Vec, 8> worst;
             std::array<double, 8> reach;
-            reach.fill(kOutside);
-            for_each_corner(node, [&](const Vec& p) {
-                const Vec y = fit.inverse * (p - fit.center);
+            reach.fill(outside);
+            for (const Vec& p : corners) {
+                const Vec y = fit.radial(p);
+                const double r = y.squaredNorm();
+                if (!(r > outside)) continue;
                 const size_t octant = (y.x() > 0) | (y.y() > 0) << 1 | (y.z() > 0) << 2;
-                if (const double r = y.squaredNorm(); r > reach[octant]) reach[octant] = r, worst[octant] = p;
-            });
+                if (r > reach[octant]) reach[octant] = r, worst[octant] = p;
+            }
             const size_t before = core.size();
             for (size_t i = 0; i < worst.size(); ++i)
-                if (reach[i] > kOutside) core.push_back(worst[i]);
+                if (reach[i] > outside) core.push_back(worst[i]);
             if (core.size() == before) break;
         }
         const auto reach = [&](const Fit& decoded) {
-            double largest = 0;
-            for_each_corner(node, [&](const Vec& p) { largest = std::max(largest, decoded.radial_squared(p)); });
-            return std::sqrt(largest) + radial_margin(decoded, options_.margin);
+            return decoded.reach(corners) + radial_margin(decoded, options_.margin);
         };
         const auto packed = covering_node(fit, lattice_, reach);
         if (!packed) {
@@ -218,7 +219,7 @@ private:
         node.packed = *packed;
         node.packed.child_count = children, node.packed.triangle_count = triangles;
         Box box;
-        for_each_corner(node, [&](const Vec& p) { box.add(p); });
+        for (const Vec& p : corners) box.add(p);
         for (int i = 0; i < 3; ++i) node.packed.box_low[i] = box.low[i], node.packed.box_high[i] = box.high[i];
     }
 
@@ -251,7 +252,6 @@ private:
 
     // Renumbers the vertices: the first of each connected component in front, the others as they are first used.
     void number_vertices(ExactTree& out) const {
-        constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
         std::vector<uint32_t> parent(mesh_.vertices.size());
         std::iota(parent.begin(), parent.end(), 0u);
         const auto root_of = [&](uint32_t v) {
@@ -281,6 +281,7 @@ private:
     std::atomic<bool> too_large_ = false;
     std::atomic<uint64_t> done_ = 0;
     const BinaryTree binary_;
+    const CornersByUse corners_;    // in its order
     std::vector<Opening> openings_; // of its nodes
     std::vector<Choice> choices_;   // of its nodes, most_lanes() for each
     format::Lattice lattice_;

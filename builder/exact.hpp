@@ -1,6 +1,7 @@
 // Exact trees: triangles in the leaves, ellipsoids that only cull.
 #pragma once
 
+#include "builder/effort.hpp"
 #include "builder/eigen.hpp"
 
 #include "src/format.hpp"
@@ -17,6 +18,7 @@ struct ExactOptions {
     uint32_t leaf_triangles; ///< at most, 1 ... kMaxLeafTriangles
     double min_radius;       ///< metres; keeps flat nodes from flat ellipsoids
     double margin;           ///< metres; ellipsoids hold all points within it of their triangles
+    ExactEffort effort;
     /// Called now and then with the share that is done.
     std::function<void(double)> progress;
 };

@@ -75,7 +75,9 @@ public:
         : lifted_(points.size()), weight_(points.size(), 0), kappa_(points.size()) {
         for (size_t i = 0; i < points.size(); ++i) lifted_[i] << points[i], 1;
         // From extreme points along a few directions (Kumar and Yildirim 2005): the weights stay sparse.
-        for (const Vec& d : sketch_directions().first(8)) {
+        constexpr size_t kDirections = 8, kFew = 8; // of few points, most are extreme
+        if (points.size() <= kFew) std::fill(weight_.begin(), weight_.end(), 1.0);
+        for (const Vec& d : sketch_directions().first(points.size() <= kFew ? 0 : kDirections)) {
             size_t low = 0, high = 0;
             for (size_t i = 1; i < points.size(); ++i) {
                 if (d.dot(points[i]) < d.dot(points[low])) low = i;
@@ -220,7 +222,18 @@ double Fit::reach(std::span<const Vec> points) const {
     return std::sqrt(largest);
 }
 
+namespace {
+
+// Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
+bool plainly_within_caps(const Fit& fit, double min_radius, double max_ratio) {
+    const double inverse = fit.inverse.norm();
+    return fit.factor.norm() * inverse <= max_ratio && inverse * min_radius <= 1;
+}
+
+} // namespace
+
 Fit capped(const Vec& center, const Mat& q, double min_radius, double max_ratio) {
+    if (const Fit fit(center, cholesky(q)); plainly_within_caps(fit, min_radius, max_ratio)) return fit;
     const Eigen3x3 axes = eigen_of(q);
     double radii[3];
     for (size_t i = 0; i < 3; ++i) radii[i] = std::sqrt(std::max(axes.values[i], 0.0));
@@ -236,9 +249,7 @@ Fit capped(const Vec& center, const Mat& q, double min_radius, double max_ratio)
 }
 
 bool within_caps(const Fit& fit, double min_radius, double max_ratio) {
-    // Frobenius norms bound the ratio from above, within a factor 3, without an eigenproblem.
-    const double inverse = fit.inverse.norm();
-    if (fit.factor.norm() * inverse <= max_ratio && inverse * min_radius <= 1) return true;
+    if (plainly_within_caps(fit, min_radius, max_ratio)) return true;
     const Eigen3x3 axes = eigen_of(fit.factor * fit.factor.transpose());
     const double thinnest = axes.values[2] * (1 + 1e-6); // capped() itself gets there only up to rounding
     return thinnest * max_ratio * max_ratio >= axes.values[0] && thinnest >= min_radius * min_radius;

@@ -10,7 +10,9 @@
 // Complexity: O(n) an inner node of n corners, some hundred products a corner.
 #include "builder/hulls.hpp"
 
+#include "builder/corners_by_use.hpp"
 #include "builder/fit.hpp"
+#include "builder/hull_distance.hpp"
 #include "builder/job.hpp"
 
 #include "src/bytes.hpp"
@@ -26,7 +28,6 @@
 namespace prolate {
 namespace {
 
-constexpr int kMostSteps = 64;
 constexpr size_t kPlanes = 16; // that are tried for a slab
 // Of a node's size: a slab that is thicker tells no more than the hull, whose points are rounded, unless it ends with a
 // face. That is at least kFewest triangles, and that share of the node's area, which are as near to a plane as floats
@@ -37,149 +38,106 @@ constexpr size_t kFewest = 16;
 // is at most 2^14.
 constexpr double kShareRounding = 1e-9;
 
-// The convex combination of at most four of the points that is nearest to w, found as in P. Wolfe 1976, "Finding the
-// nearest point in a polytope": the point that is farthest towards w joins those that the combination is of, and those
-// that the nearest point of their affine hull needs less than nothing of leave.
-class NearestCombination {
+// How far points reach along directions, up and down: loops over directions, which compilers vectorise.
+class Reaches {
 public:
-    NearestCombination(std::span<const Vec> points, const Vec& w) : points_(points), w_(w) {
-        corners_[0] = farthest(w), weights_[0] = 1;
-        x_ = points[corners_[0]];
+    explicit Reaches(size_t directions) : count_(std::min(directions, kMost)) {
+        up_.fill(-HUGE_VALF), down_.fill(-HUGE_VALF);
     }
-    double distance() const { return (w_ - x_).norm(); }
-    // False once it is as near as it gets.
-    bool improve() {
-        const Vec to = w_ - x_;
-        const size_t next = farthest(to);
-        const double along = to.dot(points_[next] - x_);
-        if (!(along > kLeastStep * to.squaredNorm()) || count_ == 4) return false;
-        corners_[count_] = next, weights_[count_++] = 0;
-        while (!settle())
-            if (count_ == 0) return false;
-        Vec x = Vec::Zero();
-        for (size_t i = 0; i < count_; ++i) x += weights_[i] * points_[corners_[i]];
-        const bool nearer = (w_ - x).squaredNorm() < to.squaredNorm();
-        if (nearer) x_ = x;
-        return nearer;
-    }
-
-private:
-    static constexpr double kLeastStep = 1e-3;
-
-    size_t farthest(const Vec& direction) const {
-        size_t best = 0;
-        double most = -HUGE_VAL;
-        for (size_t i = 0; i < points_.size(); ++i)
-            if (const double d = direction.dot(points_[i]); d > most) most = d, best = i;
-        return best;
-    }
-    // Moves the weights to those of the nearest point of the affine hull, or as far as none is below 0, and then drops
-    // the corner that stopped them. True if none did. Without corners, it has failed.
-    bool settle() {
-        const std::array<double, 4> wanted = nearest_in_affine_hull();
-        double share = 1;
-        size_t stops = count_;
-        for (size_t i = 0; i < count_; ++i) {
-            if (wanted[i] > 0) continue;
-            const double reached = weights_[i] / (weights_[i] - wanted[i]);
-            if (!(reached >= share)) share = reached, stops = i;
+    void add(const Vec& point, uint32_t name) {
+        const auto x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
+                   z = static_cast<float>(point.z());
+        const Directions& along = directions();
+        for (size_t d = 0; d < count_; ++d) {
+            const float height = (along.x[d] * x + along.y[d] * y) + along.z[d] * z;
+            highest_[d] = height > up_[d] ? name : highest_[d], up_[d] = height > up_[d] ? height : up_[d];
+            lowest_[d] = -height > down_[d] ? name : lowest_[d], down_[d] = -height > down_[d] ? -height : down_[d];
         }
-        if (stops == count_) {
-            weights_ = wanted;
-            return true;
-        }
-        for (size_t i = 0; i < count_; ++i) weights_[i] += share * (wanted[i] - weights_[i]);
-        --count_;
-        for (size_t i = stops; i < count_; ++i) corners_[i] = corners_[i + 1], weights_[i] = weights_[i + 1];
-        return false;
     }
-    // Weights of the corners, which sum to 1. Of corners in one plane, on one line or in one place, not a number.
-    std::array<double, 4> nearest_in_affine_hull() const {
-        const Vec &origin = points_[corners_[0]], to = w_ - origin;
-        std::array<double, 4> out{1, 0, 0, 0};
-        if (count_ == 1) return out;
-        const auto edge = [&](size_t i) { return points_[corners_[i]] - origin; };
-        const Vec d = edge(1);
-        if (count_ == 2) {
-            out[1] = to.dot(d) / d.squaredNorm();
-        } else {
-            const Vec e = edge(2), n = d.cross(e);
-            if (count_ == 3) {
-                out[1] = to.cross(e).dot(n) / n.squaredNorm(), out[2] = d.cross(to).dot(n) / n.squaredNorm();
-            } else {
-                const Vec f = edge(3);
-                const double volume = n.dot(f);
-                out[1] = to.cross(e).dot(f) / volume, out[2] = d.cross(to).dot(f) / volume, out[3] = n.dot(to) / volume;
-            }
+    // Which of all points reaches farther than the others by most, if any does.
+    struct Farthest {
+        float by = 0;
+        uint32_t name = 0;
+    };
+    Farthest beyond(const Reaches& others) const {
+        Farthest out;
+        for (size_t d = 0; d < count_; ++d) {
+            if (up_[d] - others.up_[d] > out.by) out = {up_[d] - others.up_[d], highest_[d]};
+            if (down_[d] - others.down_[d] > out.by) out = {down_[d] - others.down_[d], lowest_[d]};
         }
-        out[0] = 1 - (out[1] + out[2] + out[3]);
+        return out;
+    }
+    // The farthest points, each direction's.
+    std::vector<uint32_t> extremes() const {
+        std::vector<uint32_t> out(highest_.begin(), highest_.begin() + static_cast<std::ptrdiff_t>(count_));
+        out.insert(out.end(), lowest_.begin(), lowest_.begin() + static_cast<std::ptrdiff_t>(count_));
         return out;
     }
 
-    std::span<const Vec> points_;
-    const Vec w_;
-    Vec x_;
-    std::array<size_t, 4> corners_{};
-    std::array<double, 4> weights_{};
-    size_t count_ = 1;
+private:
+    static constexpr size_t kMost = 48;
+    struct Directions {
+        std::array<float, kMost> x, y, z;
+    };
+    static const Directions& directions() {
+        static const Directions table = [] {
+            Directions out{};
+            for (size_t d = 0; d < kMost; ++d) {
+                const Vec& along = sketch_directions()[d];
+                out.x[d] = static_cast<float>(along.x()), out.y[d] = static_cast<float>(along.y());
+                out.z[d] = static_cast<float>(along.z());
+            }
+            return out;
+        }();
+        return table;
+    }
+    const size_t count_;
+    std::array<float, kMost> up_, down_;
+    std::array<uint32_t, kMost> highest_{}, lowest_{};
 };
 
-// An upper bound on the distance of w from the convex hull of the points, close to it if it is above `enough`.
-double distance_from_hull(std::span<const Vec> points, const Vec& w, double enough) {
-    NearestCombination nearest(points, w);
-    double distance = nearest.distance();
-    for (int step = 0; step < kMostSteps && distance > enough && nearest.improve(); ++step)
-        distance = nearest.distance();
-    return distance;
-}
-
 // Those that are the farthest along some direction, if there are many: the hull of the others is not much smaller.
-std::vector<Vec> outermost(const std::vector<Vec>& w) {
-    const auto directions = sketch_directions();
-    if (w.size() <= 2 * directions.size()) return w;
-    std::vector<size_t> chosen;
-    for (const Vec& d : directions) {
-        size_t low = 0, high = 0;
-        double least = HUGE_VAL, most = -HUGE_VAL;
-        for (size_t i = 0; i < w.size(); ++i) {
-            const double height = d.dot(w[i]);
-            if (height < least) least = height, low = i;
-            if (height > most) most = height, high = i;
-        }
-        chosen.insert(chosen.end(), {low, high});
-    }
-    std::sort(chosen.begin(), chosen.end());
-    chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+std::vector<Vec> outermost(const std::vector<Vec>& w, const Reaches& reaches) {
+    std::vector<uint32_t> extremes = reaches.extremes();
+    if (w.size() <= extremes.size()) return w;
+    std::sort(extremes.begin(), extremes.end());
+    extremes.erase(std::unique(extremes.begin(), extremes.end()), extremes.end());
     std::vector<Vec> out;
-    out.reserve(chosen.size());
-    for (const size_t i : chosen) out.push_back(w[i]);
+    for (const uint32_t i : extremes) out.push_back(w[i]);
     return out;
 }
 
-// Some of the points, whose hull the others are near.
-std::vector<Vec> choose(const std::vector<Vec>& w) {
+// Some of the points, whose hull the others are near. The first ones are told by how far the hull reaches, which is the
+// distance of convex sets, if the directions are many; the last ones by the distance itself, which takes longer.
+std::vector<Vec> choose(const std::vector<Vec>& w, const std::vector<Vec>& all_w, const Reaches& all,
+                        size_t directions) {
     if (w.size() <= kHullPoints) return w;
+    constexpr size_t kByReach = 12;
     std::vector<Vec> out;
-    const auto farthest = [&](auto&& distance) {
-        size_t best = 0;
-        double most = -HUGE_VAL;
-        for (size_t i = 0; i < w.size(); ++i)
-            if (const double d = distance(i); d > most) most = d, best = i;
-        return std::pair(best, most);
-    };
-    out.push_back(w[farthest([&](size_t i) { return w[i].squaredNorm(); }).first]);
+    HullDistance hull;
+    const auto take = [&](const Vec& point) { out.push_back(point), hull.add(point); };
+    Reaches chosen(directions);
+    while (out.size() < kByReach) {
+        const Reaches::Farthest next = all.beyond(chosen);
+        if (!(next.by > 0)) break;
+        take(all_w[next.name]), chosen.add(out.back(), next.name);
+    }
     std::vector<double> distance(w.size(), HUGE_VAL); // from the hull so far, at most
+    std::vector<Combination> nearest(w.size());
+    const auto farthest = [&] {
+        return static_cast<size_t>(std::max_element(distance.begin(), distance.end()) - distance.begin());
+    };
     Checkpoints checkpoints;
     while (out.size() < kHullPoints) {
         double most = 0; // those that were nearer need not be looked at again
-        const auto [next, gap] = farthest([&](size_t i) {
+        const auto look_at = [&](size_t i) {
             checkpoints();
-            if (distance[i] > most)
-                distance[i] = distance_from_hull(out, w[i], most), most = std::max(most, distance[i]);
-            return distance[i];
-        });
-        if (!(gap > 0)) break;
-        out.push_back(w[next]);
+            if (distance[i] > most) distance[i] = hull(w[i], most, nearest[i]), most = std::max(most, distance[i]);
+        };
+        look_at(farthest());
+        for (size_t i = 0; i < w.size(); ++i) look_at(i);
+        if (!(most > 0)) break;
+        take(w[farthest()]);
     }
     return out;
 }
@@ -191,34 +149,50 @@ double twice_area(const TreeView& tree, uint32_t triangle) {
     return (to_vec(tree.vertex(t[1])) - p).cross(to_vec(tree.vertex(t[2])) - p).norm();
 }
 
-// What lies below a node: triangles, and their corners, each once.
 struct Face {
     uint32_t triangle;
     double area; // twice
 };
-struct Below {
-    std::vector<Face> faces;
-    std::vector<Vec> corners;
-};
-Below below(const TreeView& tree, uint32_t node) {
-    Below out;
-    std::vector<uint32_t> vertices;
-    const auto collect = [&](const auto& self, uint32_t at) -> void {
-        const TriangleRange range = tree.triangles(at);
-        for (uint32_t t = range.first; t < range.first + range.count; ++t) {
-            out.faces.push_back({t, twice_area(tree, t)});
-            for (const uint32_t v : tree.triangle(t)) vertices.push_back(v);
-        }
-        const ChildRange children = tree.children(at);
-        for (uint32_t i = 0; i < children.count; ++i) self(self, children.first + i);
+
+// What lies below the nodes of a tree: in depth-first order, that below a node is consecutive.
+class Below {
+public:
+    explicit Below(const TreeView& tree) : parts_(tree.slot_count()), corners_(walk(tree), vertices_of(tree)) {}
+    std::vector<Face> faces(uint32_t node) const {
+        return {faces_.begin() + parts_[node].begin, faces_.begin() + parts_[node].end};
+    }
+    std::vector<Vec> corners(uint32_t node) const { return corners_.of(parts_[node].begin, parts_[node].end); }
+
+private:
+    struct Part {
+        uint32_t begin = 0, end = 0; // of faces_
     };
-    collect(collect, node);
-    std::sort(vertices.begin(), vertices.end());
-    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-    out.corners.reserve(vertices.size());
-    for (const uint32_t v : vertices) out.corners.push_back(to_vec(tree.vertex(v)));
-    return out;
-}
+    std::vector<Triangle> walk(const TreeView& tree) {
+        std::vector<Triangle> out;
+        const auto visit = [&](const auto& self, uint32_t at) -> void {
+            parts_[at].begin = static_cast<uint32_t>(faces_.size());
+            const TriangleRange range = tree.triangles(at);
+            for (uint32_t t = range.first; t < range.first + range.count; ++t) {
+                faces_.push_back({t, twice_area(tree, t)});
+                out.push_back(tree.triangle(t));
+            }
+            const ChildRange children = tree.children(at);
+            for (uint32_t i = 0; i < children.count; ++i) self(self, children.first + i);
+            parts_[at].end = static_cast<uint32_t>(faces_.size());
+        };
+        visit(visit, 0);
+        return out;
+    }
+    static std::vector<Vec3> vertices_of(const TreeView& tree) {
+        std::vector<Vec3> out(tree.vertex_count());
+        for (uint32_t v = 0; v < out.size(); ++v) out[v] = tree.vertex(v);
+        return out;
+    }
+
+    std::vector<Part> parts_; // of slots
+    std::vector<Face> faces_;
+    const CornersByUse corners_; // of these
+};
 
 // Between which heights over a plane all corners lie, rounded outwards; wider than `enough`, perhaps too little, once
 // it is certain that the plane is neither on the one side of all of them nor on the other, but for `touching`.
@@ -262,8 +236,8 @@ void store_slab(std::byte* record, const Slab& plane, uint32_t triangle, const H
 
 // Of the planes of the largest triangles that with the thinnest slab, if that is thin for a node of this size; else the
 // plane of a face, with all of the node on one side of it, that has the most area.
-void describe_slab(const TreeView& tree, Below& below, double size, std::byte* record) {
-    std::vector<Face>& faces = below.faces;
+void describe_slab(const TreeView& tree, std::vector<Face> faces, std::span<const Vec> corners, double size,
+                   std::byte* record) {
     const size_t count = std::min(faces.size(), kPlanes);
     double whole = 0;
     for (const Face& face : faces) whole += face.area;
@@ -276,7 +250,7 @@ void describe_slab(const TreeView& tree, Below& below, double size, std::byte* r
     for (const Face& face : std::span(faces).first(count)) {
         const Slab plane = plane_of(tree, face.triangle);
         if (!Vec(plane.normal).allFinite()) continue;
-        const Heights heights = heights_over(plane, below.corners, thinnest, touching);
+        const Heights heights = heights_over(plane, corners, thinnest, touching);
         if (heights.width() <= thinnest) {
             thin = true, thinnest = heights.width();
             store_slab(record, plane, face.triangle, heights);
@@ -289,46 +263,54 @@ void describe_slab(const TreeView& tree, Below& below, double size, std::byte* r
     }
 }
 
-void describe(const TreeView& tree, uint32_t node, std::byte* record) {
+void describe(const TreeView& tree, const Below& below, uint32_t node, size_t directions, std::byte* record) {
     const Fit fit(tree.ellipsoid(node));
-    Below at = below(tree, node);
-    describe_slab(tree, at, fit.factor.norm(), record);
-    std::vector<Vec> w = std::move(at.corners);
+    std::vector<Vec> w = below.corners(node);
+    describe_slab(tree, below.faces(node), w, fit.factor.norm(), record);
     for (Vec& x : w) x = fit.radial(x);
-    const std::vector<Vec> candidates = outermost(w), chosen = choose(candidates);
+    Reaches all(directions);
+    for (uint32_t i = 0; i < w.size(); ++i) all.add(w[i], i);
+    const std::vector<Vec> candidates = outermost(w, all), points = choose(candidates, w, all, directions);
     for (size_t i = 0; i < kHullPoints; ++i) // the last again where there are fewer
         for (size_t k = 0; k < 3; ++k) {
-            const double x = chosen[std::min(i, chosen.size() - 1)][static_cast<int>(k)];
+            const double x = points[std::min(i, points.size() - 1)][static_cast<int>(k)];
             const double q = std::clamp(std::round(x * kHullUnit), -kHullUnit, kHullUnit);
             store_le(record + kHullPoint + kHullPoints * k + i, static_cast<int8_t>(q));
         }
-    const Hull hull(record);
-    double most = hull.distance(Vec::Zero(), 0);                                   // the center, too: FORMAT.md
-    for (const Vec& x : candidates) most = std::max(most, hull.distance(x, most)); // what others are compared with
+    // The center lies within it, too (FORMAT.md). Of the corners, those come first that others are compared with.
+    Hull hull(record);
+    double share = 0; // 255ths
+    const auto hold = [&](const Vec& x) {
+        const double enough = share / kHullShares - kShareRounding, distance = hull.distance(x, enough);
+        if (!(distance <= enough)) share = std::ceil((distance + kShareRounding) * kHullShares);
+    };
+    hold(Vec::Zero());
+    for (const Vec& x : candidates) hold(x);
     Checkpoints checkpoints;
-    for (const Vec& x : w) most = std::max(most, hull.distance(x, most)), checkpoints();
-    const double share = std::ceil((most + kShareRounding) * kHullShares);
+    for (const Vec& x : w) hold(x), checkpoints();
     store_le(record + kHullShare, static_cast<uint8_t>(share <= kHullShares ? share : 0));
 }
 
 } // namespace
 
 Hull::Hull(const std::byte* record) : share(load_le<uint8_t>(record + kHullShare) / kHullShares) {
-    for (size_t i = 0; i < kHullPoints; ++i)
-        for (size_t k = 0; k < 3; ++k)
-            points[i][static_cast<int>(k)] = load_le<int8_t>(record + kHullPoint + kHullPoints * k + i) / kHullUnit;
+    for (size_t i = 0; i < kHullPoints; ++i) {
+        const auto coordinate = [&](size_t k) -> double {
+            return load_le<int8_t>(record + kHullPoint + kHullPoints * k + i);
+        };
+        points_.add({coordinate(0), coordinate(1), coordinate(2)});
+    }
 }
 
-double Hull::distance(const Vec& w, double enough) const {
-    return distance_from_hull(points, w, enough);
-}
-
-std::vector<std::byte> hulls_of(const TreeView& tree) {
+std::vector<std::byte> hulls_of(const TreeView& tree, const ExactEffort& effort) {
     std::vector<std::byte> out(size_t{tree.block_count()} * kHullBytes);
+    const Below below(tree);
     parallel_for(uint32_t{0}, tree.slot_count(), [&](uint32_t node) {
         if (!tree.is_node(node)) return;
         const ChildRange children = tree.children(node);
-        if (children.count > 0) describe(tree, node, out.data() + size_t{children.first / kBlockLanes} * kHullBytes);
+        if (children.count > 0)
+            describe(tree, below, node, effort.hull_directions,
+                     out.data() + size_t{children.first / kBlockLanes} * kHullBytes);
     });
     return out;
 }

@@ -2,28 +2,36 @@
 // holds all triangles below the node. It fits far closer than the ellipsoid, and its support is quick to find.
 #pragma once
 
+#include "builder/effort.hpp"
 #include "builder/eigen.hpp"
+#include "builder/hull_distance.hpp"
+
 #include "src/hull.hpp"
 
 #include <prolate/tree.hpp>
 
-#include <array>
 #include <cstddef>
 #include <vector>
 
 namespace prolate {
 
 /// The hull records (src/FORMAT.md) of an exact tree, one for each block; the same for any number of threads.
-std::vector<std::byte> hulls_of(const TreeView& tree);
+std::vector<std::byte> hulls_of(const TreeView& tree, const ExactEffort& effort);
 
-/// A record, decoded: unit-ball coordinates of the node (Fit::radial).
-struct Hull {
+/// A record, decoded.
+class Hull {
+public:
     explicit Hull(const std::byte* record);
-    /// An upper bound on the distance of w from the hull of the points; close to it if it is above `enough`.
-    double distance(const Vec& w, double enough) const;
+    /// HullDistance of w, in unit-ball coordinates of the node (Fit::radial).
+    double distance(const Vec& w, double enough) {
+        return points_(kHullUnit * w, kHullUnit * enough, last_) / kHullUnit;
+    }
 
-    std::array<Vec, kHullPoints> points;
     double share; ///< of the ellipsoid; 0: nothing is known
+
+private:
+    HullDistance points_; // in units of 1 / kHullUnit, which floats hold
+    Combination last_;    // corners that are asked for one after the other are often near the same face
 };
 
 } // namespace prolate

@@ -162,7 +162,7 @@ Result<void> append_inner_cover(std::vector<std::byte>& file, MeshView mesh, con
         return Error{ErrorCode::bad_mesh,
                      "the solid is too thin, or too small, for an ellipsoid inside it; bake without an inner cover", 0};
     std::vector<format::PackedLevel> levels = Arranger(leaves, lattice, options.degree).run();
-    measure(levels, lattice, measuring_columns(mesh, true, winding, kColumns));
+    measure(levels, lattice, measuring_columns(mesh, true, &winding, kColumns));
     BakeInfo info = tree;
     info.inner = true, info.exact = false;
     format::append_section(file, kInnerKind, format::encode(info, options.degree, lattice, levels));

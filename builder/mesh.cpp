@@ -10,12 +10,13 @@
 // inside is worth a little move. Corner by corner a triangle then moves by the weld distance at most, and so do all its
 // points, for they are convex combinations of its corners; the cover holds a margin of that width around the surface.
 //
-// By sorting, so O(n log n) for every input, and the same result everywhere: vertices and triangles keep their order.
+// By sorting numbers, so O(n) for every input, and the same result everywhere: vertices and triangles keep their order.
 // Known limit: duplicated triangles stay.
 #include "builder/mesh.hpp"
 
 #include "builder/eigen.hpp"
 #include "builder/job.hpp"
+#include "builder/radix_sort.hpp"
 #include "builder/shells.hpp"
 
 #include "src/hash.hpp"
@@ -52,15 +53,13 @@ std::vector<uint32_t> representatives(std::span<const Vec3> vertices) {
     struct Key {
         std::array<uint32_t, 3> position;
         uint32_t index;
-        auto operator<=>(const Key&) const = default;
     };
     // Adding +0 turns -0 into +0 and leaves every other number alone.
     const auto bits = [](float coordinate) { return std::bit_cast<uint32_t>(coordinate + 0.0f); };
     std::vector<Key> keys(vertices.size());
     for (uint32_t i = 0; i < keys.size(); ++i)
         keys[i] = {{bits(vertices[i].x), bits(vertices[i].y), bits(vertices[i].z)}, i};
-    Checkpoints checkpoint;
-    std::sort(keys.begin(), keys.end(), [&checkpoint](const Key& a, const Key& b) { return checkpoint(), a < b; });
+    for (size_t k = 3; k-- > 0;) radix_sort(keys, [k](const Key& key) { return uint64_t{key.position[k]}; });
     std::vector<uint32_t> first(vertices.size());
     for (size_t i = 0; i < keys.size(); ++i) {
         const bool same = i > 0 && keys[i].position == keys[i - 1].position;
@@ -101,9 +100,7 @@ std::vector<Side> sorted_sides(std::span<const Triangle> triangles) {
             sides.push_back({std::min(from, to), std::max(from, to), from < to ? 1 : -1});
         }
     }
-    Checkpoints checkpoint;
-    std::sort(sides.begin(), sides.end(),
-              [&checkpoint](const Side& a, const Side& b) { return checkpoint(), before(a, b); });
+    radix_sort(sides, [](const Side& s) { return uint64_t{s.low} << 32 | s.high; });
     return sides;
 }
 

@@ -22,7 +22,7 @@ Pieces::Pieces(MeshView mesh, bool closed, const Winding& winding, uint32_t reso
 
 Pieces::Pieces(MeshView mesh, bool closed, const Winding& winding, const Voxels& voxels)
     : mesh_(mesh), closed_(closed), origin_(voxels.origin()), step_(voxels.pitch() / kParts),
-      columns_(mesh, closed, winding, corner_lattice(voxels, kParts)) {
+      columns_(mesh, closed, &winding, corner_lattice(voxels, kParts)) {
     for (size_t a = 0; a < 3; ++a) buckets_[a] = (voxels.size()[a] + kBlock - 1) / kBlock;
     in_bucket_.resize(bucket_index(buckets_[0] - 1, buckets_[1] - 1, buckets_[2] - 1) + 1);
     add_voxels(voxels);

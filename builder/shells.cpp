@@ -11,6 +11,7 @@
 #include "builder/shells.hpp"
 
 #include "builder/job.hpp"
+#include "builder/radix_sort.hpp"
 #include "builder/winding.hpp"
 
 #include <Eigen/Geometry>
@@ -50,9 +51,7 @@ Shells find_shells(std::span<const Triangle> triangles) {
             const uint32_t from = triangles[t][i], to = triangles[t][(i + 1) % 3];
             if (from != to) sides.push_back({std::min(from, to), std::max(from, to), t, from < to ? 1 : -1});
         }
-    std::sort(sides.begin(), sides.end(), [](const ShellSide& a, const ShellSide& b) {
-        return a.low != b.low ? a.low < b.low : a.high != b.high ? a.high < b.high : a.triangle < b.triangle;
-    });
+    radix_sort(sides, [](const ShellSide& s) { return uint64_t{s.low} << 32 | s.high; }); // triangles keep their order
     std::vector<uint32_t> parent(triangles.size());
     std::iota(parent.begin(), parent.end(), 0u);
     const auto root_of = [&](uint32_t t) {

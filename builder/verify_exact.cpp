@@ -77,7 +77,7 @@ bool in_slab(const Slab& slab, const Vec& x) {
     return height - rounding >= slab.low && height + rounding <= slab.high;
 }
 
-bool in_hull(const Hull& hull, const Vec& w) {
+bool in_hull(Hull& hull, const Vec& w) {
     const double enough = hull.share - kHullRounding;
     return hull.distance(w, enough) <= enough;
 }

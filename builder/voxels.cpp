@@ -97,7 +97,7 @@ void Voxels::collect_cells(MeshView mesh, bool closed, const Winding& winding) {
     const Buckets crossing(std::move(triangle_pairs), voxels);
 
     // Corners inside the closed solid.
-    const Columns corners(mesh, closed, winding,
+    const Columns corners(mesh, closed, &winding,
                           {origin_.x(), origin_.y(), pitch_, pitch_, size_[0] + 1, size_[1] + 1});
     const auto corner_index = [&](int i, int j, int k) {
         return (static_cast<size_t>(i) * static_cast<size_t>(size_[1] + 1) + static_cast<size_t>(j)) *

@@ -137,7 +137,8 @@ std::optional<Model> load_model(const std::string& path) {
 }
 
 Judge::Judge(const Model& model, int columns_across)
-    : winding_(model.mesh.view()), solid_(measuring_columns(model.mesh.view(), model.closed, winding_, columns_across)),
+    : winding_(model.mesh.view()),
+      solid_(measuring_columns(model.mesh.view(), model.closed, &winding_, columns_across)),
       volume_(solid_.volume().value), closed_(model.closed) {
     Eigen::AlignedBox3d box;
     for (const Vec3& v : model.mesh.vertices) box.extend(to_vec(v));
@@ -180,7 +181,7 @@ double Judge::farthest(MeshView surface) const {
 
 Figures Judge::hulls(MeshView hulls, uint32_t count) const {
     int added = 0;
-    const Columns cover(hulls, true, Winding(hulls), grown_around(solid_.lattice(), hulls, added));
+    const Columns cover(hulls, true, nullptr, grown_around(solid_.lattice(), hulls, added));
     double common = 0;
     for (int i = 0; i < solid_.lattice().nx; ++i)
         for (int j = 0; j < solid_.lattice().ny; ++j)

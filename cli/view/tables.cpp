@@ -70,7 +70,7 @@ NodeFigures node_figures(const TreeView& tree, const CleanMesh& mesh, const Soli
         place[node] = static_cast<uint32_t>(slots.size());
         slots.push_back(node);
     });
-    const Columns columns = measuring_columns(mesh.mesh.view(), mesh.report.closed, solid.winding(), kColumnsAcross);
+    const Columns columns = measuring_columns(mesh.mesh.view(), mesh.report.closed, &solid.winding(), kColumnsAcross);
     out.outside_volume.resize(slots.size());
     tbb::parallel_for(size_t{0}, slots.size(), [&](size_t n) {
         const Ellipsoid e = tree.ellipsoid(slots[n]);

@@ -73,7 +73,7 @@ void descend_onto(const Mesh& mesh, std::vector<Fit>& set, const DescentOptions&
 CoverVolume measure(const Mesh& mesh, std::span<const Fit> fits) {
     std::vector<Ellipsoid> ellipsoids;
     for (const Fit& fit : fits) ellipsoids.push_back(fit.ellipsoid());
-    return measure_cover(measuring_columns(mesh.view(), true, Winding(mesh.view()), 200), ellipsoids);
+    return measure_cover(measuring_columns(mesh.view(), true, nullptr, 200), ellipsoids);
 }
 
 double uncovered(const CoverVolume& volume) {

@@ -19,7 +19,7 @@ __extension__ typedef __int128 Exact; // NOLINT(modernize-use-using): only so do
 
 MassProperties mass_of_solid(const Mesh& mesh, bool closed = true, int columns_across = 128) {
     const Winding winding(mesh.view());
-    return mass_of(mesh.view(), closed, measuring_columns(mesh.view(), closed, winding, columns_across));
+    return mass_of(mesh.view(), closed, measuring_columns(mesh.view(), closed, &winding, columns_across));
 }
 
 // What is asked of all results: the truth lies within the error, and the error is no larger than `relative` says.

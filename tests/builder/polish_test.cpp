@@ -30,7 +30,7 @@ struct Scene {
     DistanceField field{mesh.view(), closed, winding, 40};
     Voxels cells{mesh.view(), closed, winding, 20};
     Pieces pieces{mesh.view(), closed, winding, 32};
-    Columns columns = measuring_columns(mesh.view(), closed, winding, 96);
+    Columns columns = measuring_columns(mesh.view(), closed, &winding, 96);
 
     explicit Scene(Mesh m, bool is_closed = true) : mesh(std::move(m)), closed(is_closed) {}
     double outside(std::span<const Fit> fits) const {
