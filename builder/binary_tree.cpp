@@ -65,11 +65,6 @@ public:
         const Matrix3 v = eigen_symmetric(covariance).vectors; // columns
         for (size_t k = 0; k < 3; ++k)
             axes_[k] = {static_cast<float>(v[0][k]), static_cast<float>(v[1][k]), static_cast<float>(v[2][k])};
-        for (size_t k = 0; k < 3; ++k)
-            for (size_t r = 0; r < 3; ++r) {
-                const float first = axes_[k][r], second = axes_[(k + 1) % 3][r];
-                axes_[6 + 2 * k][r] = first + second, axes_[7 + 2 * k][r] = first - second;
-            }
     }
     void heights(size_t axis, std::span<float> out) const {
         const auto [x, y, z] = axes_[axis];

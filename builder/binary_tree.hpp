@@ -59,7 +59,7 @@ private:
 /// Salmon 1987), and a nearly round body's surface with its mean width squared; running widths cost nothing.
 class BinaryTree {
 public:
-    static constexpr size_t kMostAxes = 12;
+    static constexpr size_t kMostAxes = 6;
     struct Part {
         uint32_t begin, end; ///< of the order of triangles
         uint32_t size() const { return end - begin; }
@@ -72,9 +72,9 @@ public:
         double squared_width = 0; ///< of its Extents
     };
 
-    /// Tries the first `axes` of up to kMostAxes: the principal ones, longest first, the world's, and the diagonals of
-    /// the principal ones. At most 2^(kMaxLevels - 1) triangles, so that it has no more levels than a file may have.
-    /// `report` is called, from many threads, for each triangle that is come down to.
+    /// Tries the first `axes` of kMostAxes: the principal ones, longest first, and the world's. At most 2^(kMaxLevels -
+    /// 1) triangles, so that it has no more levels than a file may have. `report` is called, from many threads, for
+    /// each triangle that is come down to.
     BinaryTree(MeshView mesh, size_t axes, std::function<void()> report);
 
     std::span<const Node> nodes() const { return nodes_; }

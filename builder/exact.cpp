@@ -9,7 +9,9 @@
 // 30.1 thousand; with parts opened by largest cost until a node is full or they fit leaves of 4, it was 25.6 / 34.2 /
 // 32.7 / 30.9, and the horse's file 7 % larger. Other measures for w^2 made it no better: surface of the box, other
 // powers and directions, covariances, and the surface of ellipsoids fitted to each candidate (2 % better for three
-// times the time); nor does moving subtrees within the binary tree (3 %).
+// times the time); nor does moving subtrees within the binary tree (3 %). Blocks tested grow by 2 to 5 % if the binary
+// tree takes the four body diagonals in the place of the six face diagonals, and by 7 to 20 % if it tries only the
+// principal axes (bench_exact).
 //
 // Each node gets a minimum-volume ellipsoid around the corners of its triangles: fitted to their farthest points in the
 // sketch directions (merged from the children's), then refitted with what sticks out.

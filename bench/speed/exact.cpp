@@ -138,8 +138,7 @@ int run(const std::vector<std::string>& files) {
         }
         const auto mesh = load_mesh(file.c_str());
         if (!mesh) return fmt::print(stderr, "bench_exact: {}: {}\n", file, mesh.error().what), 1;
-        for (const auto& [name, quality] :
-             {std::pair("normal", Quality::normal), {"fast", Quality::fast}, {"best", Quality::best}}) {
+        for (const auto& [name, quality] : {std::pair("normal", Quality::normal), {"fast", Quality::fast}}) {
             const double start = cpu_seconds(CLOCK_PROCESS_CPUTIME_ID);
             auto built = build(mesh->view(), {.exact = true, .quality = quality, .threads = 1});
             if (!built) return fmt::print(stderr, "bench_exact: {}: {}\n", file, built.error().what), 1;

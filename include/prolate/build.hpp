@@ -46,8 +46,8 @@ struct BuildOptions {
     /// at most an eighth more. All figures are then about the filled solid. 0: only what the mesh encloses is inside.
     /// See ball_range().
     float fill = 0;
-    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, weld, inner and threads then
-    /// matter.
+    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, quality, weld, inner and threads
+    /// then matter.
     bool exact = false;
     uint32_t leaf_triangles = 4; ///< most triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
 
@@ -56,7 +56,7 @@ struct BuildOptions {
     uint32_t inner = 0;
 
     Primitive primitive = Primitive::ellipsoid; ///< what the nodes are
-    Quality quality = Quality::normal;          ///< resolution of the voxels, and effort of the optimisation
+    Quality quality = Quality::normal;          ///< resolution of the voxels, effort of the search
     Method method = Method::voxel;              ///< how E_vol is evaluated; analytic needs a closed mesh
     float alpha = 0.5f;                         ///< weight of E_sur^3, at least 0 (paper, eq. 3)
     float beta = 0.5f;                          ///< weight of E_vol, at least 0; alpha + beta must be above 0
@@ -82,7 +82,7 @@ BallRange ball_range(double longest_side) noexcept;
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It rises whenever the same file and options give
 /// other bytes, so that no cache takes an old bake for a new one.
-inline constexpr uint32_t kBuilderVersion = 15;
+inline constexpr uint32_t kBuilderVersion = 16;
 
 /// Hash of everything except the mesh that determines the bytes: the options (without `threads`), kBuilderVersion and
 /// kFormatVersion. With hash(MeshView) of the cleaned mesh it makes the key of a cache of bakes. BakeInfo holds both.
