@@ -78,12 +78,12 @@ private:
 };
 
 // The height of a triangle in the upper half, as a number that grows with it, and its place: a total order.
-uint64_t key_of(float height, uint32_t place) {
+uint64_t sort_key(float height, uint32_t place) {
     const auto bits = std::bit_cast<uint32_t>(height + 0.0f); // -0 is 0
     const uint32_t rising = bits >> 31 ? ~bits : bits | 0x80000000u;
     return uint64_t{rising} << 32 | place;
 }
-uint32_t place_of(uint64_t key) {
+uint32_t place_in(uint64_t key) {
     return static_cast<uint32_t>(key);
 }
 
@@ -137,18 +137,18 @@ uint32_t BinaryTree::cut_sorted(const Part& p, uint64_t most) {
         std::array<float, kSortedBelow> heights;
         std::array<double, kSortedBelow> right;
         centers.heights(axis, std::span(heights).first(size));
-        for (uint32_t i = 0; i < size; ++i) keys[i] = key_of(heights[i], i);
+        for (uint32_t i = 0; i < size; ++i) keys[i] = sort_key(heights[i], i);
         std::sort(keys.begin(), keys.begin() + size);
         if (axis == 0) longest = chosen = keys;
         const Cut cut = best_cut(
-            size, right, [&](size_t i) -> const Extents& { return extents[place_of(keys[i])]; },
+            size, right, [&](size_t i) -> const Extents& { return extents[place_in(keys[i])]; },
             [](size_t) { return 1u; });
         if (cut.cost < best.cost) best = cut, chosen = keys;
     }
     uint32_t left = best.left;
     if (left == 0 || std::max(left, size - left) > most) chosen = longest, left = size / 2;
     std::array<uint32_t, kSortedBelow> from;
-    for (uint32_t i = 0; i < size; ++i) from[i] = place_of(chosen[i]);
+    for (uint32_t i = 0; i < size; ++i) from[i] = place_in(chosen[i]);
     reorder(p, std::span(from).first(size));
     return left;
 }
@@ -190,7 +190,7 @@ uint32_t BinaryTree::cut_binned(const Part& p, uint64_t most) {
         left = size / 2;
         std::iota(from.begin(), from.end(), 0u);
         std::nth_element(from.begin(), from.begin() + left, from.end(),
-                         [&](uint32_t i, uint32_t j) { return key_of(heights[i], i) < key_of(heights[j], j); });
+                         [&](uint32_t i, uint32_t j) { return sort_key(heights[i], i) < sort_key(heights[j], j); });
         std::sort(from.begin(), from.begin() + left), std::sort(from.begin() + left, from.end());
     } else {
         centers.heights(static_cast<size_t>(cheapest - cuts.begin()), heights);

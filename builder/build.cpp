@@ -30,7 +30,7 @@ namespace prolate {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kColumns = 512; // across, to measure solids by
+constexpr int kSolidColumns = 512; // across, to measure solids by
 
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
@@ -78,7 +78,7 @@ private:
         Pieces pieces = cut_pieces(mesh_, closed(), winding, expected_leaves(options_), resolution_,
                                    [this] { report("voxelise", 0.01, 0); });
         report("voxelise", 0.04, 0);
-        const Columns columns = measure_solid(&winding, kColumns);
+        const Columns columns = measure_solid(&winding, kSolidColumns);
         if (auto possible = check(columns); !possible) return possible.error();
 
         report("fit", 0.05, 1);
@@ -96,7 +96,8 @@ private:
         report("measure", 0, 0);
         // Of an open one it takes very long, and nobody needs it. A few columns tell whether parts of a closed one
         // overlap.
-        if (closed() && measure_solid(nullptr, kColumns / 2).winding_defect() > 0) measure_solid(nullptr, kColumns);
+        if (closed() && measure_solid(nullptr, kSolidColumns / 2).winding_defect() > 0)
+            measure_solid(nullptr, kSolidColumns);
         report("split", 0.1, 1);
         const ExactEffort exact = exact_effort_of(options_.quality);
         const auto grown =

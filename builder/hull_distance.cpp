@@ -10,8 +10,8 @@
 namespace prolate {
 namespace {
 
-constexpr int kMostSteps = 64;
-constexpr double kLeastGain = 1e-3; // of the squared distance, by which a point must be farther towards w to join
+constexpr int kMostImprovements = 64;
+constexpr double kLeastApproach = 1e-3; // of the squared distance, by which a point must be farther towards w to join
 
 class NearestCombination {
 public:
@@ -23,7 +23,8 @@ public:
     }
     double improve_until(double enough) {
         double reached = (w_ - x_).norm();
-        for (int step = 0; step < kMostSteps && reached > enough && improve(); ++step) reached = (w_ - x_).norm();
+        for (int step = 0; step < kMostImprovements && reached > enough && improve(); ++step)
+            reached = (w_ - x_).norm();
         return reached;
     }
 
@@ -37,7 +38,7 @@ private:
         if (at_.count == 4) return false;
         const Vec to = w_ - x_, before = x_;
         const size_t next = hull_.farthest(to);
-        if (!(to.dot(hull_.point(next) - x_) > kLeastGain * to.squaredNorm())) return false;
+        if (!(to.dot(hull_.point(next) - x_) > kLeastApproach * to.squaredNorm())) return false;
         at_.corners[at_.count] = next, at_.weights[at_.count++] = 0;
         settle();
         const bool nearer = (w_ - x_).squaredNorm() < to.squaredNorm();

@@ -97,7 +97,7 @@ private:
 };
 
 // Those that are the farthest along some direction, if there are many: the hull of the others is not much smaller.
-std::vector<Vec> outermost(const std::vector<Vec>& w, const Reaches& reaches) {
+std::vector<Vec> extremes_of(const std::vector<Vec>& w, const Reaches& reaches) {
     std::vector<uint32_t> extremes = reaches.extremes();
     if (w.size() <= extremes.size()) return w;
     std::sort(extremes.begin(), extremes.end());
@@ -270,7 +270,7 @@ void describe(const TreeView& tree, const Below& below, uint32_t node, size_t di
     for (Vec& x : w) x = fit.radial(x);
     Reaches all(directions);
     for (uint32_t i = 0; i < w.size(); ++i) all.add(w[i], i);
-    const std::vector<Vec> candidates = outermost(w, all), points = choose(candidates, w, all, directions);
+    const std::vector<Vec> candidates = extremes_of(w, all), points = choose(candidates, w, all, directions);
     for (size_t i = 0; i < kHullPoints; ++i) // the last again where there are fewer
         for (size_t k = 0; k < 3; ++k) {
             const double x = points[std::min(i, points.size() - 1)][static_cast<int>(k)];

@@ -46,8 +46,8 @@ struct BuildOptions {
     /// at most an eighth more. All figures are then about the filled solid. 0: only what the mesh encloses is inside.
     /// See ball_range().
     float fill = 0;
-    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, quality, weld, inner and threads
-    /// then matter.
+    /// Make an exact tree (tree.hpp). Of the other options, only degree, leaf_triangles, quality, weld, inner and
+    /// threads then matter.
     bool exact = false;
     uint32_t leaf_triangles = 4; ///< most triangles in a leaf of an exact tree, 1 ... kMaxLeafTriangles
 

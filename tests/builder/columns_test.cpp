@@ -51,8 +51,7 @@ TEST(Columns, MeasureAUnionAgainstTheSolid) {
     for (const float side : {0.5f, 0.02f}) {
         const Mesh cube = shapes::moved(shapes::box(side, side, side), {0.25f, -0.25f, -0.25f});
         const std::vector<Ellipsoid> balls{{}, {.center = {1, 0, 0}}};
-        const CoverVolume volume =
-            measure_cover(measuring_columns(cube.view(), true, nullptr, 400), balls);
+        const CoverVolume volume = measure_cover(measuring_columns(cube.view(), true, nullptr, 400), balls);
         const double ball = 4.0 / 3.0 * std::numbers::pi, lens = std::numbers::pi / 12 * (4 + 1) * (2 - 1) * (2 - 1);
         const double solid = std::pow(double{side}, 3);
         const auto expect = [](const Quadrature& measured, double exact) {

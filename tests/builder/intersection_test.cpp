@@ -285,9 +285,7 @@ TEST(InsideVolume, CountsOverlapsTwiceAndTurnsSignWithTheMesh) {
 
     // Columns tell which meshes are so.
     const ColumnLattice lattice{-0.0123, -0.0123, 0.0101, 0.0101, 160, 160};
-    const auto defect = [&](const Mesh& mesh) {
-        return Columns(mesh.view(), true, nullptr, lattice).winding_defect();
-    };
+    const auto defect = [&](const Mesh& mesh) { return Columns(mesh.view(), true, nullptr, lattice).winding_defect(); };
     EXPECT_EQ(defect(shapes::box()), 0);
     EXPECT_NEAR(defect(shapes::inverted(shapes::box())), 2, 0.05);
     EXPECT_NEAR(defect(two), 0.5 * 0.75 * 0.875, 0.02); // of the overlap
