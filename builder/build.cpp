@@ -30,7 +30,7 @@ namespace prolate {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr int kSolidColumns = 512; // across, to measure solids by
+constexpr int kAcross = 512; // across, to measure solids by
 
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
@@ -78,7 +78,7 @@ private:
         Pieces pieces = cut_pieces(mesh_, closed(), winding, expected_leaves(options_), resolution_,
                                    [this] { report("voxelise", 0.01, 0); });
         report("voxelise", 0.04, 0);
-        const Columns columns = measure_solid(&winding, kSolidColumns);
+        const Columns columns = measure_solid(&winding, kAcross);
         if (auto possible = check(columns); !possible) return possible.error();
 
         report("fit", 0.05, 1);
@@ -94,18 +94,15 @@ private:
     // Split the triangles, bound them, prove.
     Result<Build> bake_exact() {
         report("measure", 0, 0);
-        // Of an open one it takes very long, and nobody needs it. A few columns tell whether parts of a closed one
-        // overlap.
-        if (closed() && measure_solid(nullptr, kSolidColumns / 2).winding_defect() > 0)
-            measure_solid(nullptr, kSolidColumns);
+        // Of an open one it takes very long, and nobody needs it. Fewer columns tell if parts of a closed one overlap.
+        if (closed() && measure_solid(nullptr, kAcross / 2).winding_defect() > 0) measure_solid(nullptr, kAcross);
         report("split", 0.1, 1);
-        const ExactEffort exact = exact_effort_of(options_.quality);
         const auto grown =
             grow_exact(mesh_, {.degree = options_.degree,
                                .leaf_triangles = options_.leaf_triangles,
                                .min_radius = min_radius(),
                                .margin = report_.weld_distance,
-                               .effort = exact,
+                               .effort = exact_effort_of(options_.quality),
                                .progress = [this](double done) { report("split", 0.1 + 0.75 * done, 0); }});
         if (!grown) return grown.error();
         std::vector<std::byte> bytes =
@@ -113,8 +110,7 @@ private:
         report("hulls", 0.85, 0);
         const auto without_hulls = TreeView::open(bytes, {.check_hash = false}); // Tree::open() checks the whole
         if (!without_hulls) return without_hulls.error();
-        format::store_hulls(bytes, hulls_of(*without_hulls, exact));
-
+        format::store_hulls(bytes, hulls_of(*without_hulls, exact_effort_of(options_.quality)));
         std::vector<LevelReport> figures(grown->levels.size()); // of a cover of the surface alone: none but these
         for (uint32_t l = 0; l < figures.size(); ++l)
             without_hulls->for_each_in_cut(l, [&](uint32_t) { ++figures[l].nodes; });
@@ -170,8 +166,7 @@ private:
         const Quadrature solid = columns.volume();
         if (!(solid.value > kNoInside * std::pow(box_.size().norm(), 3))) return columns;
         mass_ = mass_of(mesh_, closed(), columns);
-        const bool integrated = options_.exact && mass_.volume > 0; // else what covers are compared with
-        solid_ = integrated ? Quadrature{mass_.volume, mass_.volume_error} : solid;
+        solid_ = options_.exact && mass_.volume > 0 ? Quadrature{mass_.volume, mass_.volume_error} : solid;
         return columns;
     }
 
@@ -203,10 +198,9 @@ private:
     double relative(double volume) const { return solid_.value > 0 ? volume / solid_.value : 0; }
 
     Grown grow_tree(Pieces& pieces, const Winding& winding) {
-        constexpr int kFewColumns = 192; // across, to compare covers by: fewer than to measure them
         const DistanceField field(mesh_, closed(), winding, field_resolution(resolution_));
         const Voxels cells = start_cells(mesh_, closed(), winding, expected_leaves(options_), resolution_);
-        const Columns columns = measuring_columns(mesh_, closed(), &winding, kFewColumns);
+        const Columns columns = measuring_columns(mesh_, closed(), &winding, 192); // fewer: only to compare covers by
         const auto exact = [&winding](const Fit& fit) { return outside_volume(fit, inside_volume(fit, winding)); };
         const auto distance = [&](std::span<const Ellipsoid> cover) {
             const HausdorffDistance found = hausdorff_distance(cover, winding, closed(), distance_tolerance(), 1);
