@@ -21,7 +21,8 @@ struct Search {
 
 struct Effort {
     uint32_t resolution; ///< voxels along the longest side, at least
-    Search search;       ///< for sets of up to 64 ellipsoids
+    Search few;          ///< for sets of up to 16 ellipsoids
+    Search search;       ///< for those of up to 64
     Search many;         ///< for larger ones, of which starts differ little and a large step of the polish gains more
     Search middle; ///< a second search for sets of 17 to 64 ellipsoids, which long descents often suit; if starts > 0
     double distance_tolerance; ///< of measured distances: of the largest one, in diagonals
@@ -30,16 +31,16 @@ struct Effort {
 
 constexpr Effort effort_of(Quality quality) {
     constexpr Search none{}, fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01},
-        best{3, 1500, 2, 1, 12, 0.01, 24};
+        few{3, 1500, 2, 1, 12, 0.01, 24}, best{3, 1500, 2, 1, 12, 0.05};
     switch (quality) {
     case Quality::fast:
-        return {64, fast, {1, 300, 0, 1, 6, 0.05}, none, 1e-3, 2000};
+        return {64, fast, fast, {1, 300, 0, 1, 6, 0.05}, none, 1e-3, 2000};
     case Quality::normal:
-        return {96, normal, {1, 1000, 0, 1, 16, 0.05}, none, 1e-4, 8000};
+        return {96, normal, normal, {1, 1000, 0, 1, 16, 0.05}, none, 1e-4, 8000};
     case Quality::best:
         break;
     }
-    return {192, best, {3, 1500, 2, 1, 12, 0.05}, {3, 4000, 0, 2, 20, 0.05}, 1e-4, 32000};
+    return {192, few, best, {3, 1500, 2, 1, 12, 0.05}, {3, 4000, 0, 2, 20, 0.05}, 1e-4, 32000};
 }
 
 /// How an exact tree is looked for.

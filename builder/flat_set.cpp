@@ -92,7 +92,7 @@ FlatSet FlatSetMaker::make(uint32_t count, const FlatSet* above, const std::func
         }
     };
     const bool twice = effort_.middle.starts > 0 && count > kFew && count <= kMergeLimit;
-    look(count > kMergeLimit ? effort_.many : effort_.search, 0, twice ? 0.3 : 1);
+    look(count > kMergeLimit ? effort_.many : count > kFew ? effort_.search : effort_.few, 0, twice ? 0.3 : 1);
     if (twice) look(effort_.middle, 0.3, 1);
     return best;
 }
