@@ -43,7 +43,7 @@ become modes, their weights within -1 and 1, or --range.
 
 With --exact, the tree goes down to the mesh's triangles and stores them, a few in each leaf. Its ellipsoids cover
 the surface only, and queries answer for the triangles. 100,000 triangles take less than a second of CPU time;
---quality fast takes a fifth less, for queries up to a quarter slower, and best is as normal.
+--quality fast takes a sixth less, for queries up to a quarter slower, and best is as normal.
 
 Coordinates are taken from the file, as metres unless --unit or --scale says otherwise. The unit that a 3MF states
 is applied; that of a DAE is only reported. The tree stores scale and local origin, and answers of queries are

@@ -79,7 +79,7 @@ def bake(
         solid, proved. The mesh must be closed, or filled. See :func:`collide_solids`.
     primitive : {"ellipsoid", "sphere"}
     quality : {"fast", "normal", "best"}
-        Effort of the search. Of an exact tree, fast takes a fifth less CPU time, for queries up to a quarter slower;
+        Effort of the search. Of an exact tree, fast takes a sixth less CPU time, for queries up to a quarter slower;
         best is as normal.
     method : {"voxel", "analytic"}
         How outside volumes are found; analytic needs a closed mesh.
