@@ -125,9 +125,9 @@ private:
     };
 
     // What two triangles have by themselves, if it is no longer than another patch's way: a normal of a face, or one
-    // point that waits.
+    // point that waits. If it is longer it is not known, but asked for once no way resolves the pair.
     struct Own {
-        dvec3 normal{0, 0, 0}; // 0: none
+        dvec3 normal{0, 0, 0}; // 0: not known
         bool certain = false;
         uint32_t waiting = 0;
     };
@@ -281,9 +281,11 @@ private:
     }
     // What two triangles had in the first pass.
     void add_own(const MeetingPair& pair, const Own& own) {
-        if (own.certain)
+        if (own.normal == dvec3(0))
+            for (const Contact& c : pairs_.by_itself(pair)) add_by_itself(c);
+        else if (own.certain)
             for (const Contact& c : pairs_.along(own.normal, pair)) add_by_itself(c);
-        else if (own.normal != dvec3(0))
+        else
             add_by_itself(waiting_.contacts[own.waiting]);
     }
     void add_by_itself(const Contact& c) {

@@ -1,4 +1,5 @@
 // Contact manifolds: boxes, balls and heaps with known contacts, and what holds for all bodies.
+#include "query/contacts/contacts.hpp"
 #include "query/ellipsoid/gap.hpp"
 #include "query/ellipsoid/separation.hpp"
 #include "tests/exact_scenes.hpp"
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -649,6 +651,33 @@ TEST(Contacts, VerdictsAreThoseOfCollideAndContactsArePoints) {
     });
     EXPECT_GT(overlapping, 100);
     EXPECT_GT(apart, 100);
+}
+
+// What the first pass does not know of a pair, because a patch resolved it that made no manifold, the second one finds:
+// the manifolds are as deep as those of a second search.
+TEST(Contacts, FewPairsAreAsDeepAsASecondSearchFindsThem) {
+    const scenes::ExactScene scene = scenes::exact_tree(shapes::torus(1, 0.3f, 24, 12));
+    const TreeView torus = *TreeView::open(scene.bytes);
+    const auto deepest = [](const ContactManifolds& manifolds) {
+        float most = -HUGE_VALF;
+        for (uint32_t i = 0; i < manifolds.count; ++i)
+            for (uint32_t k = 0; k < manifolds.manifolds[i].count; ++k)
+                most = std::max(most, manifolds.manifolds[i].points[k].depth);
+        return most;
+    };
+    scenes::Random random(7);
+    const auto context = std::make_unique<QueryContext>();
+    int count = 0;
+    for (int i = 0; i < 600; ++i) {
+        const Pose a = scenes::pose_at(random, random.in(0, 1.5)), b = scenes::pose_at(random, random.in(0, 1.5));
+        ContactManifolds repeated, searched;
+        const ContactResult r = query::contacts(torus, a, torus, b, repeated, *context, {}, query::kMany);
+        if (r.found == 0 || r.found >= query::kMany) continue;
+        query::contacts(torus, a, torus, b, searched, *context, {}, r.found);
+        EXPECT_GT(deepest(repeated), 0.99f * deepest(searched)) << i;
+        ++count;
+    }
+    EXPECT_GT(count, 50);
 }
 
 TEST(Contacts, ExchangedBodiesHaveExchangedContacts) {

@@ -328,6 +328,68 @@ TEST(HalfSpace, PointsKeepTheirAgeAndImpulse) {
     }
 }
 
+// Whatever the manifolds were of before: the last step, another body, pose, plane, margin, level or budget.
+TEST(HalfSpace, WhatWasKnownBeforeNeverMisleads) {
+    const Bodies bodies;
+    Random random(41);
+    const auto context = std::make_unique<QueryContext>();
+    ContactManifolds manifolds;
+    size_t which = 0;
+    Pose pose;
+    HalfSpace half_space{{0, 0, 1}, 0};
+    float margin = 0;
+    int touching = 0, apart = 0;
+    const auto moved = [&random](const Vec3& v, double by) {
+        const Point d = random.in_ball();
+        return scenes::to_float({v.x + by * d[0], v.y + by * d[1], v.z + by * d[2]});
+    };
+    for (int i = 0; i < 3000; ++i) {
+        const double choice = random.in(0, 1), step = random.log_in(1e-6, 0.1);
+        if (choice < 0.05) which = static_cast<size_t>(i) % bodies.trees.size();
+        if (choice < 0.2) {
+            pose = scenes::pose_at(random, random.in(0, 2));
+        } else if (choice < 0.3) {
+            half_space = ground(random);
+        } else if (choice < 0.4) {
+            margin = i % 2 == 0 ? 0 : static_cast<float>(random.log_in(1e-4, 0.5));
+        } else {
+            pose.translation = moved(pose.translation, step);
+            const Vec3 turned = moved({pose.rotation.x, pose.rotation.y, pose.rotation.z}, step);
+            pose.rotation = {turned.x, turned.y, turned.z, pose.rotation.w};
+        }
+        const TreeView& tree = bodies.trees[which];
+        const auto lowest = [&] {
+            const std::vector<Real> all = heights(tree, pose, plane_of(half_space));
+            return static_cast<double>(*std::min_element(all.begin(), all.end()));
+        };
+        if (choice > 0.5) half_space.offset += static_cast<float>(lowest() + (choice > 0.7 ? step : -step));
+        QueryOptions options{.margin = margin};
+        if (i % 10 == 0) options.max_pair_tests = static_cast<uint64_t>(random.log_in(1, 300));
+        if (i % 10 == 5) options.max_level = static_cast<uint32_t>(i) % 4;
+        const ContactResult got = contacts(tree, pose, half_space, manifolds, *context, options);
+        const double least = lowest();
+        if (got.verdict == Verdict::separated) {
+            EXPECT_GT(least, margin - 1e-6) << i;
+        }
+        if (i % 5 == 0) continue;
+        ASSERT_EQ(got.verdict, overlap(tree, pose, half_space, *context, options).verdict) << i;
+        ASSERT_EQ(manifolds.count, got.verdict == Verdict::overlapping ? 1u : 0u) << i;
+        ++(manifolds.count == 0 ? apart : touching);
+        if (manifolds.count == 0) continue;
+        const Manifold& m = manifolds.manifolds[0];
+        float deepest = -HUGE_VALF;
+        for (uint32_t k = 0; k < m.count; ++k) {
+            const ContactPoint& p = m.points[k];
+            deepest = std::max(deepest, p.depth);
+            EXPECT_GE(p.depth, -margin - 1e-6f) << i;
+            EXPECT_NEAR(static_cast<double>(plane_of(half_space).height(reference::vector(p.point_a))), -p.depth, 4e-6);
+        }
+        EXPECT_NEAR(deepest, -least, std::max(0.01 * std::abs(least), 2.5e-4) + 1e-6) << i; // sizes are about 2.5
+    }
+    EXPECT_GT(touching, 1000);
+    EXPECT_GT(apart, 200);
+}
+
 TEST(HalfSpace, BudgetsOnlyWiden) {
     const Bodies bodies;
     Random random(3);
