@@ -96,7 +96,7 @@ Bound Skinning::moved(uint32_t node, const Bound& bound, const ModeShift& by) co
     out.core.factor = mean.linear * bound.core.factor;
     const double size = frobenius(mean.linear);
     if (!(std::abs(glm::determinant(mean.linear)) > kFlattest * size * size * size))
-        out.core.factor = dmat3(frobenius(out.core.factor) + out.radius);
+        out.core.factor = dmat3(frobenius(out.core.factor) + out.radius + kSkinRounding * bound.core.size); // above 0
     out.core.size = frobenius(out.core.factor);
     out.core.reach = reach + out.core.size + out.radius;
     return out;

@@ -453,6 +453,27 @@ TEST_F(SkinQuery, MatricesThatNothingHoldsForAreUndecided) {
     EXPECT_EQ(collide({rigid.tree.view(), {}, {}, bones}, far, context()).reason, Undecided::coordinates);
 }
 
+TEST_F(SkinQuery, BonesThatMapAllToAPointMakeOne) {
+    const std::vector<BoneMatrix> zero(3, BoneMatrix{.m = {}});
+    for (const Tree* point : {&ring_cover(), &ring_exact()})
+        for (const Tree* bar : {&limb_cover(), &limb_exact()}) {
+            const DeformedBody a{point->view(), {}, {}, zero}, apart{bar->view(), {{0, 1, 0}, {}}}, around{bar->view()};
+            EXPECT_EQ(collide(a, apart, context()).verdict, Verdict::separated);
+            EXPECT_EQ(collide(apart, a, context()).verdict, Verdict::separated);
+            EXPECT_EQ(collide(a, around, context()).verdict, Verdict::overlapping);
+            EXPECT_EQ(collide(around, a, context()).verdict, Verdict::overlapping);
+            const DeformedDistanceResult found = distance(a, apart, context()), swapped = distance(apart, a, context());
+            EXPECT_EQ(found.verdict, Verdict::separated);
+            EXPECT_NEAR(found.lower, found.upper, 1e-6);
+            EXPECT_NEAR(swapped.upper, found.upper, 1e-6);
+            EXPECT_EQ(bounds(a).lower.x, -bounds(a).upper.x);
+            EXPECT_LT(bounds(a).upper.x, 1e-12f);
+            const Ray from_afar{{0, 5, 0}, {0, -1, 0}}, without_direction{{0, 0, 0}, {0, 0, 0}, 1};
+            EXPECT_NEAR(raycast(a, from_afar, context()).t, 5, 1e-6);
+            EXPECT_EQ(raycast(a, without_direction, context()).reason, Undecided::input);
+        }
+}
+
 TEST(Skin, ProofNoticesWhatIsTooSmall) {
     const TreeView tree = limb_cover().view();
     const auto proof = verify_skin(tree, limb().mesh.view(), limb().skin());
