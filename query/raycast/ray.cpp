@@ -160,7 +160,7 @@ PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllips
     out.origin = origin + begin * direction, out.direction = direction;
     out.begin = begin, out.length = end - begin;
     out.reach = reach + end * speed;
-    out.valid = std::isfinite(begin) && std::isfinite(end) && std::isfinite(out.reach);
+    out.valid = speed > 0 && std::isfinite(begin) && std::isfinite(end) && std::isfinite(out.reach);
     out.shear = shear_to_axis(direction);
     return out;
 }

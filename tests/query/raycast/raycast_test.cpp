@@ -762,7 +762,10 @@ TEST(Raycast, BadInputIsUndecided) {
     const auto scene = scenes::exact_tree(shapes::box());
     const auto tree = *TreeView::open(scene.bytes);
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
-    EXPECT_EQ(cast(tree, {}, {{0, 0, -1}, {0, 0, 0}}).verdict, Verdict::undecided);
+    for (const float max_t : {5.0f, infinity}) { // wherever a ray without a direction begins
+        EXPECT_EQ(cast(tree, {}, {{0, 0, -1}, {0, 0, 0}, max_t}).verdict, Verdict::undecided);
+        EXPECT_EQ(cast(tree, {}, {{0.5f, 0.5f, 0}, {0, 0, 0}, max_t}).verdict, Verdict::undecided);
+    }
     EXPECT_EQ(cast(tree, {}, {{nan, 0, -1}, {0, 0, 1}}).verdict, Verdict::undecided);
     EXPECT_EQ(cast(tree, {}, {{0, 0, -1}, {0, infinity, 1}}).verdict, Verdict::undecided);
     EXPECT_EQ(cast(tree, {}, {{0, 0, -1}, {0, 0, 1}, nan}).verdict, Verdict::undecided);
