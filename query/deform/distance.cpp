@@ -256,8 +256,9 @@ private:
         const double reach_a = radius_a_ + beyond_a, reach_b = radius_b_ + beyond_b, bound = double{e.bound};
         const double nearer = less_radii(found.lower, reach_a + reach_b);
         const bool meet = e.flags == 0 && !(nearer > 0) && !are_apart();
-        decided_ = std::min(decided_, meet ? 0 : std::max({nearer, bound, kJustApart}));
-        const double farthest = std::max(less_radii_up(found.upper, reach_a + reach_b), bound);
+        const double least = meet ? 0.0 : std::max({nearer, bound, kJustApart}); // leaves of pairs apart may meet
+        decided_ = std::min(decided_, least);
+        const double farthest = std::max(less_radii_up(found.upper, reach_a + reach_b), least);
         if (!(farthest < upper) && !meet) return;
         upper = std::min(upper, farthest), nearest = pair, overlapping = meet;
         const dvec3 between = found.on_b - found.on_a;
