@@ -18,7 +18,7 @@ struct Crossing {
 
 /// The sign of the area of (a, b, p) in the xy-plane, for points p of a row of columns. The same edge gives exactly
 /// opposite values from its two triangles, and never zero: a point on an edge is moved by a symbolic step in +x, then
-// +y, so that every column lies in exactly one of the triangles around an edge or vertex.
+/// +y, so that every column lies in exactly one of the triangles around an edge or vertex.
 class Edge {
 public:
     Edge(const Vec& a, const Vec& b) {
