@@ -25,7 +25,8 @@ Deformed::Deformed(const DeformedBody& body, uint32_t max_level) noexcept
 }
 
 bool Deformed::encloses() const noexcept {
-    return !tree().surface_mode() && (witness_count() > 0);
+    const bool rests = body_.q.empty() && body_.bones.empty(); // then leaves cover the inside, too
+    return !tree().surface_mode() && (tree().has_triangles() || !rests) && witness_count() > 0;
 }
 
 Bound Deformed::bound(uint32_t node) const noexcept {

@@ -262,6 +262,15 @@ TEST_F(Deform, WhatLiesInsideIsNotSeparated) {
             const DeformedBody beside{inner, {{0.95f, 0.95f, 0.95f}, {}}};
             EXPECT_EQ(collide(a, beside, context()).verdict, Verdict::separated);
         }
+    // Of a cover at rest, leaves hold all that is inside: what no leaf meets lies outside, if in a hollow.
+    const Tree hollow_cover = hollow.bake(false, 64);
+    const DeformedBody at_rest{hollow_cover.view()}, within{small_exact.view()};
+    EXPECT_EQ(collide(hollow_cover.view(), {}, small_exact.view(), {}, context()).verdict, Verdict::separated);
+    EXPECT_EQ(collide(at_rest, within, context()).verdict, Verdict::separated);
+    EXPECT_EQ(collide(within, at_rest, context()).verdict, Verdict::separated);
+    const std::vector<float> q(2);
+    const DeformedBody moved{hollow_cover.view(), {}, q};
+    EXPECT_TRUE(collide(moved, within, context()).enclosed);
     // In the hole of a ring, it is not inside.
     for (const TreeView& ring : {torus_exact().view(), torus_cover().view()})
         EXPECT_EQ(collide(DeformedBody{ring}, {small_cover.view(), {}}, context()).verdict, Verdict::separated);
