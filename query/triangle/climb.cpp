@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <memory>
 #include <new>
@@ -71,34 +72,46 @@ Hills::Hills(const TreeView& tree, uint64_t& tests, uint64_t most_tests, std::sp
 // Calls visit(corners) for each triangle that has this vertex.
 template <class Visit> void Hills::find(uint32_t vertex, Visit&& visit) const {
     const BoxProbe probe(tree_.raw().lattice(), tree_.vertex(vertex));
-    struct Family {
-        uint32_t first, left; // siblings from slot `first` on
+    const auto look = [&](uint32_t begin, uint32_t triangles) {
+        tests_ += triangles;
+        for (uint32_t t = begin; t < begin + triangles; ++t) {
+            const Triangle corners = tree_.triangle(t);
+            if (std::find(corners.begin(), corners.end(), vertex) != corners.end()) visit(corners);
+        }
     };
-    Family stack[(kBlockLanes + 1) * kMaxLevels]; // of each level, the children of one block wait, and the rest of one
+    // Of each level, siblings: those from slot `first` on are still to be tested, and of the block before it, the lanes
+    // that hold the vertex to be opened.
+    struct Family {
+        uint32_t first, left, held;
+    };
+    Family stack[kMaxLevels + 1];
     uint32_t size = 0;
-    stack[size++] = {0, 1};
+    stack[size++] = {0, 1, 0};
     while (size > 0) {
         Family& family = stack[size - 1];
-        const uint32_t first = family.first, count = std::min(family.left, kBlockLanes);
+        if (family.held != 0) {
+            const auto lane = static_cast<uint32_t>(std::bit_width(family.held)) - 1;
+            family.held ^= 1u << lane;
+            const std::byte* const block = tree_.raw().block(family.first / kBlockLanes - 1);
+            stack[size++] = {first_child(block, lane), load_le<uint8_t>(block + kBlockCount + lane), 0};
+            continue;
+        }
+        if (family.left == 0) {
+            --size;
+            continue;
+        }
+        const uint32_t count = std::min(family.left, kBlockLanes);
+        const std::byte* const block = tree_.raw().block(family.first / kBlockLanes);
         family.first += kBlockLanes, family.left -= count;
-        if (family.left == 0) --size;
         tests_ += count;
-        const std::byte* const block = tree_.raw().block(first / kBlockLanes);
         const uint32_t held = probe.lanes(block);
         for (uint32_t lane = 0; lane < count; ++lane) {
             if ((held >> lane & 1) == 0) continue;
             const uint32_t children = load_le<uint8_t>(block + kBlockCount + lane);
-            if (children < kTriangleLeaf) {
-                stack[size++] = {first_child(block, lane), children};
-                continue;
-            }
-            const uint32_t begin = first_triangle(block, lane), triangles = children - kTriangleLeaf;
-            tests_ += triangles;
-            for (uint32_t t = begin; t < begin + triangles; ++t) {
-                const Triangle corners = tree_.triangle(t);
-                if (std::find(corners.begin(), corners.end(), vertex) == corners.end()) continue;
-                visit(corners);
-            }
+            if (children < kTriangleLeaf)
+                family.held |= 1u << lane;
+            else
+                look(first_triangle(block, lane), children - kTriangleLeaf);
         }
     }
 }

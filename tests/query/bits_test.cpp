@@ -120,7 +120,7 @@ TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
 }
 
 TEST(Bits, Collide) {
-    expect_bits(17069838017463300795u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(13783264195484423608u, [](Bits& bits, const Scenes::Pair& p) {
         const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
         PairCache cache;
