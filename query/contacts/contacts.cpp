@@ -244,7 +244,8 @@ private:
         patches_.for_each([&](const Patch& p) {
             const dvec3 n = pairs_.shortest_way(p);
             Group group{.patch = &p, .way = {n, p.depth()}, .deepest = Patch(n)};
-            for (const Contact& c : pairs_.deepest(p, n)) add_to(group.deepest, n, c);
+            auto add = [&](const Contact& c) { add_to(group.deepest, n, c); };
+            pairs_.deepest(p, n, {[](void* user, const Contact& c) { (*static_cast<decltype(add)*>(user))(c); }, &add});
             group.way.depth = std::max(group.way.depth, group.deepest.depth());
             uint32_t at = count++;
             for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];

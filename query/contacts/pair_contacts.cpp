@@ -220,8 +220,7 @@ dvec3 PairContacts::shortest_way(const Patch& patch) const noexcept {
 
 // From the pairs of a patch the bodies are climbed along its normal to what is deepest around there, and a ray from it
 // finds the other body's surface.
-DeepestContacts PairContacts::deepest(const Patch& patch, const dvec3& n) noexcept {
-    DeepestContacts out;
+void PairContacts::deepest(const Patch& patch, const dvec3& n, const ContactSink& out) noexcept {
     for (const bool of_a : {true, false}) {
         uint32_t seen[2 * Patch::kSieve], count = 0; // vertices
         const auto look = [&](const MeetingPair& pair, const dvec3& along) {
@@ -242,12 +241,11 @@ DeepestContacts PairContacts::deepest(const Patch& patch, const dvec3& n) noexce
             if (!(glm::dot(c.normal, n) > kSameAsFace)) look(c.pair, c.normal); // in a hollow of faces
         }
     }
-    return out;
 }
 
 // Of a vertex of the one body that lies in the other by at most `most`.
 void PairContacts::add_depth_of(uint32_t vertex, bool of_a, const MeetingPair& pair, const dvec3& n, double most,
-                                DeepestContacts& out) {
+                                const ContactSink& out) {
     const dvec3 up = of_a ? n : -n;
     const dvec3 here = position((of_a ? s_.a : s_.b).tree, vertex);
     const dvec3 at = of_a ? here : s_.b_to_a.rotation * here + s_.b_to_a.translation;
@@ -269,13 +267,13 @@ void PairContacts::add_depth_of(uint32_t vertex, bool of_a, const MeetingPair& p
     const double depth = glm::dot(face, t.corner[0] - at) / facing;
     if (!(depth >= 0 && depth <= most + same_point_)) return;
     const Part part{Part::Kind::vertex, vertex, 0}, other{Part::Kind::face, 0, 0};
-    out.add({.pair = pair,
-             .normal = n,
-             .middle = at - 0.5 * depth * up,
-             .depth = depth,
-             .a = of_a ? part : other,
-             .b = of_a ? other : part,
-             .overlap = depth});
+    out.take(out.user, {.pair = pair,
+                        .normal = n,
+                        .middle = at - 0.5 * depth * up,
+                        .depth = depth,
+                        .a = of_a ? part : other,
+                        .b = of_a ? other : part,
+                        .overlap = depth});
 }
 
 } // namespace prolate::query

@@ -44,8 +44,11 @@ struct ContactsOfPair : ContactList<TriangleContact::kPoints> {
     /// may contradict.
     bool certain = false;
 };
-/// Of each body at most two vertices for each of a patch's points.
-using DeepestContacts = ContactList<4 * Patch::kSieve>;
+/// Takes contacts one by one: lists of them would be on the stack.
+struct ContactSink {
+    void (*take)(void* user, const Contact& contact);
+    void* user;
+};
 
 class PairContacts {
 public:
@@ -67,8 +70,8 @@ public:
     /// The normal along which the bodies overlap least around a patch.
     glm::dvec3 shortest_way(const Patch& patch) const noexcept;
     /// What of either body is deepest in the other along n, around the pairs of a patch: of a finely meshed body it
-    /// meets no triangle.
-    DeepestContacts deepest(const Patch& patch, const glm::dvec3& n) noexcept;
+    /// meets no triangle. Of each body at most two vertices for each of the patch's points.
+    void deepest(const Patch& patch, const glm::dvec3& n, const ContactSink& out) noexcept;
 
 private:
     PlacedTriangle triangle_a(const MeetingPair& pair) const { return place(s_.a.tree, pair.triangle_a); }
@@ -85,7 +88,7 @@ private:
     Contact of_ellipsoids(const MeetingPair& pair) const;
     double overlap(const glm::dvec3& n, uint32_t& vertex_a, uint32_t& vertex_b, double enough) const;
     void add_depth_of(uint32_t vertex, bool of_a, const MeetingPair& pair, const glm::dvec3& n, double most,
-                      DeepestContacts& out);
+                      const ContactSink& out);
 
     CollideSearch& s_;
     Scratch context_;
