@@ -332,6 +332,8 @@ class Tree(_core.Tree):
         heat: bool = False,
         heat_top: float | None = None,
         section: str | None = None,
+        at: ArrayLike | None = None,
+        modes: str | os.PathLike[str] | None = None,
         style: str = "beside",
         samples: int | None = None,
         shadow: bool = True,
@@ -357,6 +359,10 @@ class Tree(_core.Tree):
             The same, with a legend that ends at this many % of the diagonal.
         section : str, optional
             ``"z"`` or ``"z,0.4"``: cut open across an axis.
+        at : array (M,) or (N, M), optional
+            Coordinates of a tree with modes, within their ranges: it is shown there, too, beside rest.
+        modes : path, optional
+            The ``.npz`` that ``prolate bake --modes`` takes: the mesh then moves with the tree. Exact trees know it.
         style : {"beside", "overlay", "none"}
             Where the mesh is.
         samples : int, optional
@@ -381,7 +387,10 @@ class Tree(_core.Tree):
             size="x".join(map(str, size)) if isinstance(size, (list, tuple)) else size,
             levels=levels, view=view, up=up, heat=truth("heat", heat), heat_top=heat_top, section=section,
             samples=samples, no_shadow=not truth("shadow", shadow), threads=threads,
+            modes=None if modes is None else os.path.abspath(path_of("modes", modes)),
         )  # fmt: skip
+        for q in _rows("at", at):
+            options += _command.flags(at=q)
         return _command.picture(self, mesh, options)
 
     def view(self, mesh: Any = None) -> str:
@@ -450,6 +459,21 @@ def _restored(data: object, report: dict[str, Any] | None) -> Tree:
     tree = Tree(data)
     tree._report = report
     return tree
+
+
+def _rows(name: str, coordinates: ArrayLike | None) -> list[list[float]]:
+    """One row, or several, of numbers."""
+    if coordinates is None:
+        return []
+    import numpy as np
+
+    try:
+        rows = np.atleast_2d(np.asarray(coordinates, dtype=float))
+    except (ValueError, TypeError) as error:
+        raise type(error)(f"{name}: {error}; give an array (M,) or (N, M)") from None
+    if rows.ndim != 2:
+        raise ValueError(f"{name}: must have shape (M,) or (N, M), not {rows.shape}")
+    return rows.tolist()  # type: ignore[no-any-return]
 
 
 def _bytes_of(buffer: object) -> NDArray[np.uint8]:

@@ -23,6 +23,24 @@ needs_command = pytest.mark.skipif(not os.path.exists(_command._EXECUTABLE), rea
 
 
 @needs_command
+def test_pictures_of_what_deforms(tmp_path):
+    vertices, faces = box_mesh(HALF_A)
+    lean = np.zeros((1, *np.shape(vertices)))
+    lean[0, :, 0] = np.asarray(vertices)[:, 2]
+    tree = prolate.bake(vertices, faces, ellipsoids=4, quality="fast", threads=1)
+    moving = tree.with_modes(vertices, faces, modes=lean, ranges=[0.5])
+    np.savez(tmp_path / "modes.npz", modes=lean, ranges=[0.5])
+    small = {"size": (300, 100), "levels": [1], "samples": 16, "style": "overlay"}
+    one = moving.render((vertices, faces), at=[0.5], modes=tmp_path / "modes.npz", **small)
+    both = moving.render((vertices, faces), at=[[0.5], [-0.5]], modes=tmp_path / "modes.npz", **small)
+    assert one.shape == both.shape == (100, 300, 3) and (one != both).any()
+    with pytest.raises(prolate.Error, match="range"):
+        moving.render(at=[0.6], **small)
+    with pytest.raises(ValueError, match="at:"):
+        moving.render(at=[[[0.5]]], **small)
+
+
+@needs_command
 def test_exports(tmp_path, cover):
     for kind in ("csv", "json", "ply", "obj", "glb", "pov"):
         cover.export(tmp_path / f"cover.{kind}", level=-2, view=(-30, 20) if kind == "pov" else None)
@@ -108,8 +126,9 @@ def test_free_threaded_python_is_refused_when_built(tmp_path, free):
 def test_the_command_and_bake_have_the_same_options():
     help_ = subprocess.run([_command._EXECUTABLE, "bake", "--help"], capture_output=True, text=True, check=True).stdout
     known = {name.replace("-", "_") for name in re.findall(r"^ +(?:-\w,)?--([a-z-]+)", help_, re.MULTILINE)}
-    # Files, the console, and what bake_many() and Tree.with_modes() have.
-    known -= {"help", "quiet", "output", "report", "json", "force", "manifest", "cache", "rebake", "modes", "range"}
+    # Files, the console, and what bake_many(), Tree.with_modes() and Tree.with_skin() have.
+    known -= {"help", "quiet", "output", "report", "json", "force", "manifest", "cache", "rebake"}
+    known -= {"modes", "range", "skin"}
     assert set(inspect.signature(prolate.bake).parameters) == known | {"vertices", "faces", "progress"}
 
 

@@ -54,7 +54,11 @@ def test_hulls_of_few_vertices_hold_the_points_from_outside(most: int) -> None:
     assert max(sizes) <= 1.001  # a box is a hull of eight
 
 
-@pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="signals come to the main thread")
+@pytest.mark.skipif(
+    threading.current_thread() is not threading.main_thread()
+    or signal.getsignal(signal.SIGINT) is not signal.default_int_handler,
+    reason="interrupts come to the main thread, and are ignored in the background of a shell",
+)
 def test_an_interrupt_while_a_library_is_imported_counts_afterwards() -> None:
     done = []
     with pytest.raises(KeyboardInterrupt), _uninterrupted():
