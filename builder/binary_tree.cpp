@@ -129,7 +129,7 @@ void BinaryTree::reorder(const Part& p, std::span<const uint32_t> from) {
 uint32_t BinaryTree::cut_sorted(const Part& p, uint64_t most) {
     const uint32_t size = p.size();
     const std::span<const Extents> extents = std::span(extents_).subspan(p.begin, size);
-    std::array<float, 3 * kSortedBelow> scratch;
+    std::array<float, size_t{3} * kSortedBelow> scratch;
     const Centers centers(extents, scratch);
     std::array<uint64_t, kSortedBelow> keys, longest, chosen;
     Cut best;

@@ -233,7 +233,7 @@ bool plainly_within_caps(const Fit& fit, double min_radius, double max_ratio) {
 } // namespace
 
 Fit capped(const Vec& center, const Mat& q, double min_radius, double max_ratio) {
-    if (const Fit fit(center, cholesky(q)); plainly_within_caps(fit, min_radius, max_ratio)) return fit;
+    if (Fit fit(center, cholesky(q)); plainly_within_caps(fit, min_radius, max_ratio)) return fit;
     const Eigen3x3 axes = eigen_of(q);
     double radii[3];
     for (size_t i = 0; i < 3; ++i) radii[i] = std::sqrt(std::max(axes.values[i], 0.0));

@@ -103,6 +103,7 @@ std::vector<Vec> extremes_of(const std::vector<Vec>& w, const Reaches& reaches) 
     std::sort(extremes.begin(), extremes.end());
     extremes.erase(std::unique(extremes.begin(), extremes.end()), extremes.end());
     std::vector<Vec> out;
+    out.reserve(extremes.size());
     for (const uint32_t i : extremes) out.push_back(w[i]);
     return out;
 }

@@ -225,7 +225,7 @@ private:
 
     Part add_points(const GltfValue& position, const Affine& transform) {
         const Numbers numbers = document_.rows(position, Rows::vec3);
-        const Part part{static_cast<uint32_t>(out_.points.size()), numbers.size() / 3};
+        Part part{static_cast<uint32_t>(out_.points.size()), numbers.size() / 3};
         if (!out_.can_hold(part.count)) position.fail("too many vertices (2^32 or more)");
         Checkpoints checkpoint;
         for (size_t i = 0; i < numbers.size(); i += 3) {

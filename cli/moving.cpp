@@ -20,6 +20,7 @@ std::vector<uint32_t> sources_of(const Mesh& as_read, const std::vector<Vec3>& v
     for (const Triangle& t : as_read.triangles)
         for (const uint32_t corner : t) source.emplace(place_of(as_read.vertices[corner]), corner);
     std::vector<uint32_t> out;
+    out.reserve(vertices.size());
     for (const Vec3& v : vertices) out.push_back(source.at(place_of(v)));
     return out;
 }

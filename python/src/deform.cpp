@@ -37,12 +37,12 @@ public:
     Coordinates(nb::handle q, nb::handle bones, const TreeView& tree, const std::string& of) {
         const auto modes = tree.deformation();
         const auto skin = tree.skin();
-        if (!q.is_none() && !modes) value_error(("q" + of).c_str(), "the tree has no modes");
-        if (!bones.is_none() && !skin) value_error(("bones" + of).c_str(), "the tree has no bones");
+        if (!q.is_none() && !modes) value_error("q" + of, "the tree has no modes");
+        if (!bones.is_none() && !skin) value_error("bones" + of, "the tree has no bones");
         if (!q.is_none()) q_.take(q, modes->mode_count(), "q" + of);
         if (!bones.is_none()) take_bones(bones, skin->bone_count(), "bones" + of);
         if (q_.count != 1 && bones_.count != 1 && q_.count != bones_.count)
-            value_error(("bones" + of).c_str(),
+            value_error("bones" + of,
                         "are of " + std::to_string(bones_.count) + " poses, and q of " + std::to_string(q_.count));
     }
     size_t count() const noexcept { return q_.count == 1 ? bones_.count : q_.count; }
