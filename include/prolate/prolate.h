@@ -255,8 +255,8 @@ PROLATE_API prolate_status prolate_distance_solids(prolate_body a, prolate_body 
                                                    const prolate_distance_options* options,
                                                    prolate_solids_distance* result);
 
-/** deform.hpp: DeformedBody. `q` may be null where `q_count` is 0: all coordinates are 0. `bones`: 12 floats for each, a
- * matrix of 3 by 4, row by row; may be null where `bone_count` is 0: all are the identity. */
+/** deform.hpp: DeformedBody. `q` may be null where `q_count` is 0: all coordinates are 0. `bones`: 12 floats for each,
+ * a matrix of 3 by 4, row by row; may be null where `bone_count` is 0: all are the identity. */
 typedef struct prolate_deformed_body {
     prolate_body body;
     const float* q;
