@@ -100,7 +100,7 @@ def test_pairs_are_written_and_read_as_srdf(hook, tmp_path):
     found = robots.touches(exact, covers, samples=100)
     found.save(tmp_path / "hook.srdf")
     again = robots.load(exact.description.source, srdf=tmp_path / "hook.srdf")
-    words = {"adjacent": "Adjacent", "never": "Never", "always": "Always"}
+    words = {"adjacent": "Adjacent", "never": "Never", "always": "Default"}
     assert again.disabled == {pair: words[why] for pair, why in found.disabled().items()} and not texts(
         again, "warning"
     )
