@@ -24,8 +24,8 @@ DistanceResult distance(const TreeView& tree, const Pose& pose, const HalfSpace&
 /// half-space along it takes it out of the body). Its points are the corners of an exact tree, or of ellipsoids the
 /// deepest points, that lie in the half-space or within options.margin of it: the deepest (to within 1 %, or 1e-4 of
 /// the body's size), and those that span the largest area with it, where each metre of height counts as sixteen less
-/// of extent: so of a round body those are found that it rolls onto, however large the margin. An id is that of a
-/// vertex, or node, alone.
+/// of extent: so of a round body those are found that it rolls onto, however large the margin. Where no more than four
+/// corners of a mesh of at most 64 do, they are the points. An id is that of a vertex, or node, alone.
 ///
 /// Replaces the contents of `manifolds`; points that were there before keep their age and impulse. The search begins
 /// with these points, and keeps those that touch while others reach no farther out by a sixteenth of the extent: what

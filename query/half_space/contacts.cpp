@@ -200,7 +200,7 @@ public:
         news_ = false;
         search();
         result.found = touching_.found;
-        if (news_ && s_.open == HUGE_VAL) {
+        if (news_ && s_.passed_over && s_.open == HUGE_VAL) {
             farther_ = kFineShare;
             search();
         }

@@ -32,7 +32,8 @@ class HeightTraversal {
 
 public:
     explicit HeightTraversal(HeightSearch& search)
-        : s_(search), stack_(search.stack), step_(step_of(search.side.lattice)) {}
+        : s_(search), stack_(search.stack), step_(step_of(search.side.lattice)),
+          per_step_(steps_per_metre(search.side.lattice)) {}
 
     void run() {
         if (!test(0, 1)) return stop(-HUGE_VAL);
@@ -40,7 +41,10 @@ public:
             const Entry e = stack_[--size_];
             const double bound = height(e);
             if (bound > s_.limit) continue;
-            if (s_.wanted != nullptr && e.flags != version() && !s_.wanted(s_.user, e.node_a, bound)) continue;
+            if (s_.wanted != nullptr && e.flags != version() && !s_.wanted(s_.user, e.node_a, bound)) {
+                s_.passed_over = true;
+                continue;
+            }
             const std::byte* const block = s_.side.block(e.node_a);
             const uint32_t lane = e.node_a % kBlockLanes;
             if ((s_.side.leaf_lanes(e.node_a - lane, block) >> lane & 1) != 0 || e.node_a >= s_.side.limit_from) {
@@ -66,11 +70,17 @@ private:
     }
 
     // Lower bounds of heights, steps; NaN, which claims nothing, becomes the lowest. And how far the lanes may be
-    // beyond the outline, if there is one.
+    // beyond the outline, if there is one. Lanes, as bits, that are not above `most` steps; and of these, those that
+    // are not beyond.
+    struct Kept {
+        uint32_t low = 0, within = 0;
+    };
     template <bool kOutline>
-    HWY_INLINE void bounds(const std::byte* block, float (&heights)[kBlockLanes], float (&gains)[kBlockLanes]) const {
+    HWY_INLINE Kept bounds(const std::byte* block, float most, float (&heights)[kBlockLanes],
+                           float (&gains)[kBlockLanes]) const {
         const BlockBoxes boxes(block);
         const LaneHalfSpace& h = s_.lanes;
+        Kept out;
         for (size_t first = 0; first < kBlockLanes; first += kFloatLanes) {
             const LaneNodes e = load_nodes(block, first, s_.side.lattice.step_exponent);
             const Float3 n = set(h.normal);
@@ -85,10 +95,17 @@ private:
                 box = box + at, moduli = moduli + abs(at);
             }
             box = box - h.offset - (h.slack + kLaneMargin * moduli);
-            const Float bound = greater(ellipsoid, box);
-            store(choose(bound == bound, bound, set(-HUGE_VALF)), heights + first);
-            if constexpr (kOutline) store(gain(e, side, bound), gains + first);
+            const Float bound = greater(ellipsoid, box), sound = choose(bound == bound, bound, set(-HUGE_VALF));
+            store(sound, heights + first);
+            out.low |= bits(sound <= set(most)) << first;
+            if constexpr (kOutline) {
+                const Float beyond = gain(e, side, bound);
+                store(beyond, gains + first);
+                out.within |= bits(beyond <= set(0)) << first;
+            }
         }
+        out.within &= out.low;
+        return out;
     }
     // The ellipsoid and the box each bound how far out a lane reaches.
     template <class Side> HWY_INLINE Float gain(const LaneNodes& e, Side&& side, Float bound) const {
@@ -117,13 +134,13 @@ private:
         alignas(32) float heights[kBlockLanes], gains[kBlockLanes];
         const uint32_t of = version();
         const std::byte* const block = s_.side.block(first);
-        if (of != 0)
-            bounds<true>(block, heights, gains);
-        else
-            bounds<false>(block, heights, gains);
-        const uint32_t base = size_;
-        for (uint32_t lane = 0; lane < count; ++lane) {
-            if (metres(heights[lane]) > s_.limit || (of != 0 && gains[lane] <= 0)) continue;
+        const float most = highest();
+        const Kept kept =
+            of != 0 ? bounds<true>(block, most, heights, gains) : bounds<false>(block, most, heights, gains);
+        const uint32_t siblings = (1u << count) - 1, base = size_;
+        s_.passed_over = s_.passed_over || (kept.within & siblings) != 0;
+        for (uint32_t left = kept.low & ~kept.within & siblings; left != 0; left &= left - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(left));
             const float key = of != 0 ? -gains[lane] : heights[lane];
             uint32_t at = size_++;
             for (; at > base && stack_[at - 1].bound < key; --at) stack_[at] = stack_[at - 1];
@@ -131,10 +148,15 @@ private:
         }
         return true;
     }
+    // The limit in steps, rounded up.
+    float highest() const {
+        const auto steps = static_cast<float>(s_.limit * per_step_);
+        return steps + 0x1p-22f * std::abs(steps) + std::numeric_limits<float>::min();
+    }
 
     HeightSearch& s_;
     Entry* const stack_;
-    const double step_;
+    const double step_, per_step_;
     uint32_t size_ = 0;
 };
 

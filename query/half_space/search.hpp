@@ -44,6 +44,7 @@ struct HeightSearch {
     /// metres. Null: always.
     bool (*wanted)(void* user, uint32_t slot, double bound) = nullptr;
     void* user = nullptr;
+    bool passed_over = false; ///< some node that is not of interest, though not higher than `limit`
 
     HeightSearch(const TreeView& tree, const PlacedHalfSpace& half_space, Scratch context,
                  const QueryOptions& options) noexcept

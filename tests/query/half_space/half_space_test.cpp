@@ -300,6 +300,36 @@ TEST(HalfSpace, FewCornersTouchAsManyDo) {
     EXPECT_GT(points, 200u);
 }
 
+// Four corners or fewer that touch are the manifold, however high or near each other they are.
+TEST(HalfSpace, FourCornersAreTheManifold) {
+    const scenes::ExactScene scenes[] = {scenes::exact_tree(shapes::box(1, 2, 0.001f)),
+                                         scenes::exact_tree(shapes::torus(1, 0.4f, 8, 6))};
+    Random random(6);
+    const auto context = std::make_unique<QueryContext>();
+    int whole = 0, of_more = 0;
+    for (int i = 0; i < 1000; ++i) {
+        const TreeView tree = *TreeView::open(scenes[i % 2].bytes);
+        const Pose pose = scenes::pose_at(random, 1);
+        const HalfSpace half_space = ground(random);
+        const float margin = i % 3 == 0 ? 0 : 0.2f;
+        uint32_t touching = 0;
+        for (const Real over : heights(tree, pose, plane_of(half_space))) touching += over <= margin;
+        ContactManifolds manifolds;
+        const ContactResult got = contacts(tree, pose, half_space, manifolds, *context, {.margin = margin});
+        EXPECT_EQ(got.found, touching);
+        if (touching == 0) continue;
+        ASSERT_EQ(manifolds.count, 1u);
+        const Manifold& m = manifolds.manifolds[0];
+        if (touching <= kManifoldPoints) {
+            EXPECT_EQ(m.count, touching);
+        }
+        for (uint32_t k = 1; k < m.count; ++k) EXPECT_LT(m.points[k - 1].id, m.points[k].id);
+        ++(touching <= kManifoldPoints ? whole : of_more);
+    }
+    EXPECT_GT(whole, 150);
+    EXPECT_GT(of_more, 150);
+}
+
 TEST(HalfSpace, VerticesWithoutTrianglesDoNotTouch) {
     Mesh mesh = shapes::box();
     mesh.vertices.push_back({0.5f, 0.5f, -3});
