@@ -4,7 +4,6 @@
 
 #include "query/distance/rounded.hpp"
 #include "query/half_space/lowest.hpp"
-#include "query/half_space/search.hpp"
 #include "query/node/scratch.hpp"
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// A tree against a half-space: what the vectorised traversal (search.cpp) and the queries (half_space.cpp) share.
+// A tree against a half-space: what the vectorised traversal (search.cpp) and the queries share.
 // Everything in the frame of the tree. A height is a distance from the plane, above 0 outside the half-space.
 #pragma once
 
