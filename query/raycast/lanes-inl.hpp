@@ -22,12 +22,14 @@
 // three times as much, which pays for the rounding of the bound itself. Underflow and NaN: as in lanes-inl.hpp. A ray
 // of thickness m takes another m |n| off: m is rounded up by 2^-20, which pays for 6 u m |n| of rounding.
 //
-// Boxes: the slabs between their sides (Kay and Kajiya 1986). In lattice coordinates a side is exact, and is moved
-// outwards by m + kLaneMargin (|o|_1 + |E|_1 + |c| + |o_i - b_i|) + 2^-42 reach, b_i where the block's box coordinates
-// begin: u |o_i| and u |o_i - b_i| for the rounded origin, 3 u |E_i| for the rounded span and its inverse, and at s <=
-// 1 another 3 u |E_i| for the parameter itself are a fraction of that.
+// Boxes: the slabs between their sides (Kay and Kajiya 1986). In lattice coordinates a side, b_i + q, is exact, b_i
+// where the block's box coordinates begin, and is moved outwards by m + kLaneMargin (|o|_1 + |E|_1 + |c| + |b_i - o_i|)
+// + 2^-42 reach. Of s = q / E_i + (b_i - o_i) / E_i, that costs, times |E_i|: u |o_i| for the rounded origin, 3 u |b_i
+// - o_i| for the second term, u |q| <= u (|b_i - o_i| + s |E_i|) for the first, and 4 u s |E_i| for the rounded span,
+// its inverse and the sum: at s <= 1 a fraction of that margin, and beyond it s stays above 1. Nothing here is a NaN:
+// lattice_ray() sees to it that the ray is finite.
 //
-// Cost: about 40 vector operations for the boxes, and 110 with 6 divisions and 2 square roots for the ellipsoids.
+// Cost: about 60 vector operations for the boxes, and 110 with 6 divisions and 2 square roots for the ellipsoids.
 #include "query/inside/axis_lanes-inl.hpp"
 #include "query/raycast/lanes.hpp"
 
@@ -45,43 +47,80 @@
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
-/// A ray as a block's boxes see it, in box steps: it passes the side of a box at x where s = (x - near) inverse, or
-/// with `far` for the sides that it leaves through.
-struct BoxRay {
-    alignas(32) float near[4], far[4], inverse[4]; // the fourth means nothing
-};
-HWY_INLINE BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
+/// Far below the slack, in lattice steps.
+inline constexpr float kLeastSpan = 0x1p-60f;
+/// Bounds all numbers of a ray: the slack is no less than kLaneMargin times each, and their products are floats.
+inline constexpr float kMostSlack = 0x1p40f;
+inline constexpr double kRoundThicknessUp = 1 + 0x1p-20; // also pays for the rounding of thickness |n|
+
+/// From lattice coordinates that are right within 2^-44 reach. A ray too far away or too long for floats, or one of
+/// NaN, becomes one that meets everything at 0.
+HWY_INLINE void place_in_lattice(const double (&origin)[4], const double (&span)[4], double reach, double thickness,
+                                 LatticeRay& out) {
     using Axes = hn::CappedTag<double, 4>;
     const hn::Rebind<float, Axes> f;
-    const hn::Rebind<int32_t, Axes> i;
-    BoxRay out;
+    const hn::RebindToSigned<decltype(f)> i32;
+    alignas(16) float lengths[4];
     for (size_t at = 0; at < 4; at += hn::MaxLanes(f)) {
-        const auto from = hn::PromoteTo(Axes(), load_stored<int32_t>(Axes(), block + kBlockBoxOrigin + 4 * at));
-        const auto origin = hn::DemoteTo(f, hn::PromoteTo(Axes(), hn::Load(f, ray.origin + at)) - from);
-        const auto exponent = hn::PromoteTo(i, load_stored<uint8_t>(Axes(), block + kBlockBoxExponent + at));
-        const auto power = [&](auto e) { return hn::BitCast(f, hn::ShiftLeft<23>(hn::Set(i, 127) + e)); };
-        const auto step = power(exponent), per_step = power(hn::Neg(exponent));
-        const auto wider =
-            hn::Load(f, ray.forward + at) *
-            (hn::Set(f, ray.thickness) + (hn::Set(f, ray.slack) + hn::Set(f, kLaneMargin) * hn::Abs(origin)));
-        hn::Store((origin + wider) * per_step, f, out.near + at);
-        hn::Store((origin - wider) * per_step, f, out.far + at);
-        hn::Store(hn::Load(f, ray.inverse + at) * step, f, out.inverse + at);
+        const auto o = hn::DemoteTo(f, hn::LoadU(Axes(), origin + at)),
+                   e = hn::DemoteTo(f, hn::LoadU(Axes(), span + at));
+        const auto least = hn::CopySign(hn::Set(f, kLeastSpan), e);
+        const auto inverse = hn::Set(f, 1) / hn::IfThenElse(hn::Abs(e) < hn::Set(f, kLeastSpan), least, e);
+        const auto backward = hn::RebindMask(i32, inverse < hn::Zero(f));
+        const auto low = hn::Set(i32, int32_t{kBlockBoxLow}), high = hn::Set(i32, int32_t{kBlockBoxHigh});
+        hn::Store(o, f, out.origin + at), hn::Store(e, f, out.span + at), hn::Store(inverse, f, out.inverse + at);
+        hn::Store(hn::CopySign(hn::Set(f, 1), inverse), f, out.forward + at);
+        hn::Store(hn::IfThenElse(backward, high, low), i32, out.near_side + at);
+        hn::Store(hn::IfThenElse(backward, low, high), i32, out.far_side + at);
+        hn::Store(hn::Abs(o) + hn::Abs(e), f, lengths + at);
+    }
+    out.thickness = static_cast<float>(thickness * kRoundThicknessUp);
+    out.slack =
+        kLaneMargin * (kLargestCenter + lengths[0] + lengths[1] + lengths[2]) + static_cast<float>(0x1p-42 * reach);
+    if (out.thickness + out.slack < kMostSlack) return;
+    for (size_t i = 0; i < 4; ++i) out.origin[i] = out.span[i] = out.inverse[i] = 0, out.forward[i] = 1;
+    out.thickness = 0, out.slack = std::numeric_limits<float>::max();
+}
+
+/// A ray as a block's boxes see it: it passes the side of a box at x box steps where s = x per_step + near, or + far
+/// for the sides that it leaves through.
+struct BoxRay {
+    alignas(16) float near[4], far[4], per_step[4]; // the fourth means nothing
+};
+HWY_INLINE BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
+    using IntegerTag = hn::RebindToSigned<QuadTag>;
+    const Quad certain = broadcast<Quad>(ray.thickness + ray.slack);
+    BoxRay out;
+    for (size_t at = 0; at < 4; at += kQuadLanes) {
+        const Quad from = hn::ConvertTo(QuadTag(), load_stored<int32_t>(QuadTag(), block + kBlockBoxOrigin + 4 * at)),
+                   begins = from - load<Quad>(ray.origin + at), inverse = load<Quad>(ray.inverse + at);
+        const auto exponent =
+            hn::PromoteTo(IntegerTag(), load_stored<uint8_t>(QuadTag(), block + kBlockBoxExponent + at));
+        const Quad step = hn::BitCast(QuadTag(), hn::ShiftLeft<23>(exponent + hn::Set(IntegerTag(), 127)));
+        const Quad wider = load<Quad>(ray.forward + at) * (certain + kLaneMargin * abs(begins));
+        store((begins - wider) * inverse, out.near + at);
+        store((begins + wider) * inverse, out.far + at);
+        store(inverse * step, out.per_step + at);
     }
     return out;
 }
 
-/// Lower bounds of the parameters at which the ray enters the boxes of lanes `first` and following; infinite if it does
-/// not before `limit` <= 1. NaN, which a ray that is not finite makes, is passed over.
-HWY_INLINE Float box_entries(const std::byte* block, size_t first, const LatticeRay& ray, const BoxRay& boxes,
-                             Float limit) {
-    Float enter = set(0), leave = limit;
+/// When the ray is in the boxes of some lanes, before `limit` <= 1: from lower bounds of the parameters at which it
+/// enters, to upper bounds of those at which it leaves. It misses those whose `enter` is greater.
+struct BoxTimes {
+    Float enter, leave;
+};
+HWY_INLINE BoxTimes box_times(const std::byte* block, size_t first, const LatticeRay& ray, const BoxRay& boxes,
+                              Float limit) {
+    BoxTimes out{set(0), limit};
     for (size_t i = 0; i < 3; ++i) {
-        const auto side = [&](size_t array) { return box_sides(block, array, i, first); };
-        enter = greater(enter, (side(ray.near_side[i]) - boxes.near[i]) * boxes.inverse[i]);
-        leave = lesser(leave, (side(ray.far_side[i]) - boxes.far[i]) * boxes.inverse[i]);
+        const auto side = [&](int32_t array) {
+            return box_sides(block, static_cast<size_t>(array), i, first) * boxes.per_step[i];
+        };
+        out.enter = max(out.enter, side(ray.near_side[i]) + boxes.near[i]);
+        out.leave = min(out.leave, side(ray.far_side[i]) + boxes.far[i]);
     }
-    return choose(enter > leave, set(std::numeric_limits<float>::infinity()), enter);
+    return out;
 }
 
 /// The ellipsoids, larger by a factor each. Rounding: u |L|, one of the 9 above more.

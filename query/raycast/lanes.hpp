@@ -13,16 +13,16 @@
 namespace prolate::query {
 
 /// The part of a ray that may meet a tree, in the tree's lattice coordinates: origin + s span, 0 <= s <= 1. A fourth
-/// number is 0.
+/// number means nothing. All are finite.
 struct LatticeRay {
     alignas(16) float origin[4], span[4];
-    float inverse[4]; ///< 1 / span; of a span that is (nearly) 0, one of the same sign that moves less than rounding
-    float forward[4]; ///< 1, or -1 where the ray runs against the axis
-    size_t near_side[3], far_side[3]; ///< of a block's boxes, where it enters and leaves: kBlockBoxLow or kBlockBoxHigh
-    float thickness;                  ///< nodes that come as near to the ray as this are met, too; 0, or rounded up
-    float slack;                      ///< ray_slack()
+    /// 1 / span; of a span that is (nearly) 0, one of the same sign that moves less than rounding.
+    alignas(16) float inverse[4];
+    alignas(16) float forward[4]; ///< 1, or -1 where the ray runs against the axis
+    alignas(16) int32_t near_side[4],
+        far_side[4]; ///< of a block's boxes, where it enters and leaves: kBlockBoxLow, -High
+    float thickness; ///< nodes that come as near to the ray as this are met, too; 0, or rounded up
+    float slack;     ///< ray_slack()
 };
-/// From doubles in lattice coordinates that are right within 2^-44 reach.
-LatticeRay lattice_ray(const double origin[3], const double span[3], double reach, double thickness = 0) noexcept;
 
 } // namespace prolate::query

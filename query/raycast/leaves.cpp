@@ -8,7 +8,7 @@ namespace prolate::query {
 namespace {
 
 template <class Leaf> std::optional<RayHit> hit_by(const RaycastSearch& search, const Leaf& leaf) {
-    const double margin = double{search.options.margin};
+    const double margin = double{search.body.options.margin};
     if (!(margin > 0)) return hit(search.ray, leaf);
     PlacedRay still_open = search.ray; // what lies behind the best hit takes less time
     if (search.found) still_open.length = search.best.t;
@@ -24,12 +24,13 @@ bool take(RaycastSearch& search, const std::optional<RayHit>& hit, uint32_t leaf
 } // namespace
 
 bool RaycastSearch::meet(uint32_t at) noexcept {
-    const PlacedEllipsoid e = place(growth ? side.tree.ellipsoid(at) : side.tree.bound(at), side.tree.scale());
+    const TreeView& tree = body.side.tree;
+    const PlacedEllipsoid e = place(body.growth ? tree.ellipsoid(at) : tree.bound(at), tree.scale());
     return take(*this, hit_by(*this, e), at, kNoTriangle);
 }
 
 bool RaycastSearch::meet_triangle(uint32_t leaf, uint32_t t) noexcept {
-    return take(*this, hit_by(*this, place(side.tree, t)), leaf, t);
+    return take(*this, hit_by(*this, place(body.side.tree, t)), leaf, t);
 }
 
 } // namespace prolate::query

@@ -10,130 +10,145 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-
-namespace prolate::query {
-
-namespace {
-
-LatticeRay to_lattice(const PlacedRay& ray, const LatticeInfo& lattice, double thickness) {
-    const double per_step = steps_per_metre(lattice);
-    double origin[3], span[3], reach = ray.reach * per_step;
-    for (size_t i = 0; i < 3; ++i) {
-        const auto g = static_cast<glm::length_t>(i);
-        const double shift = lattice.origin[i];
-        origin[i] = ray.origin[g] * per_step - shift;
-        span[i] = ray.direction[g] * ray.length * per_step;
-        reach += std::abs(shift);
-    }
-    return lattice_ray(origin, span, reach, thickness * per_step);
-}
-
-} // namespace
-
-void RaycastSearch::begin(const PlacedRay& placed, bool any_hit) noexcept {
-    ray = placed, any = any_hit;
-    lattice_ray = to_lattice(placed, side.lattice, double{options.margin});
-    side.deepest = 0, stats = {}, found = false, clear = HUGE_VAL;
-}
-
-} // namespace prolate::query
+#include <memory>
+#include <span>
 
 namespace prolate {
-namespace {
 
 using query::to_double, query::to_float;
 
+namespace query {
+namespace {
+
 QueryOptions for_rays(const TreeView& tree, const QueryOptions& options) {
-    QueryOptions out = query::sound(options);
-    out.margin = std::min(query::with_radius(out.margin, tree.radius()),
+    QueryOptions out = sound(options);
+    out.margin = std::min(with_radius(out.margin, tree.radius()),
                           std::numeric_limits<float>::max()); // an infinite one would make NaNs
     return out;
 }
 
-query::PlacedEllipsoid root_of(const TreeView& tree, const float* growth) {
-    query::PlacedEllipsoid out = query::place(growth ? tree.root() : tree.root_bound(), tree.scale());
+PlacedEllipsoid root_of(const TreeView& tree, const float* growth) {
+    PlacedEllipsoid out = place(growth ? tree.root() : tree.root_bound(), tree.scale());
     if (growth) out.size *= double{growth[0]}, out.reach *= double{growth[0]};
     return out;
 }
 
-// Rays against one body at one pose: what they have in common is prepared once.
-class RayCaster {
-public:
-    RayCaster(const TreeView& tree, const Pose& pose, Scratch context, const QueryOptions& options,
-              const float* growth = nullptr)
-        : root_(root_of(tree, growth)), translation_(to_double(pose.translation)),
-          rotation_(glm::transpose(query::rotation_matrix(pose.rotation))),
-          search_(query::tree_side(tree, options.max_level), for_rays(tree, options), growth,
-                  query::suffices(context, tree) ? context.entries() : nullptr, root_.reach) {}
+PlacedRay place_ray(const RaycastBody& body, const Ray& ray) {
+    const glm::dvec3 from_body = to_double(ray.origin) - body.translation;
+    return place(ray, {body.rotation, body.rotation * from_body, glm::length(from_body)}, body.root,
+                 double{body.options.margin});
+}
 
-    RaycastResult cast(const Ray& ray, bool any) {
-        using glm::dvec3;
-        RaycastResult out;
-        if (!search_.stack) return out;
-        const dvec3 from_body = to_double(ray.origin) - translation_;
-        const query::PlacedRay placed = query::place(ray, {rotation_, rotation_ * from_body, glm::length(from_body)},
-                                                     root_, double{search_.options.margin});
-        if (!placed.valid) return out;
-        if (placed.empty) {
-            out.verdict = Verdict::separated, out.clear = ray.max_t;
-            return out;
-        }
-        search_.begin(placed, any);
-        const bool finished = query::traverse(search_);
-        out.stats = search_.stats;
-        out.stats.deepest_level = search_.side.deepest_level();
-        out.clear =
-            placed.begin + std::max(0.0, std::min(search_.clear, search_.found ? search_.best.t : placed.length));
-        if (!search_.found) {
-            if (finished) out.verdict = Verdict::separated, out.clear = ray.max_t;
-            return out;
-        }
-        const dvec3 direction = to_double(ray.direction);
-        out.verdict = Verdict::overlapping;
-        out.t = placed.begin + search_.best.t;
-        out.node = search_.node, out.triangle = search_.triangle;
-        // Scaled first: the products of tiny or huge edges may lie beyond a double's squares.
-        dvec3 normal = search_.best.normal;
-        const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
-        normal = largest > 0 ? normal / largest * rotation_ : -direction;
-        out.point = to_float(to_double(ray.origin) + out.t * direction);
-        out.normal = to_float(normal / glm::length(normal));
-        return out;
+} // namespace
+
+RaycastBody::RaycastBody(const TreeView& tree, const Pose& pose, Scratch scratch, const QueryOptions& asked,
+                         const float* grown) noexcept
+    : side(tree_side(tree, asked.max_level)), options(for_rays(tree, asked)), growth(grown),
+      stacks(suffices(scratch, tree) ? reinterpret_cast<RayFamily*>(scratch.entries()) : nullptr),
+      stack_size(ray_stack_size(tree)),
+      rays_at_once(std::min(
+          static_cast<uint32_t>(size_t{scratch.count()} * sizeof(Scratch::Entry) / (stack_size * sizeof(RayFamily))),
+          kRaysAtOnce)),
+      root(root_of(tree, grown)), translation(to_double(pose.translation)),
+      rotation(glm::transpose(rotation_matrix(pose.rotation))), per_step(steps_per_metre(side.lattice)) {
+    for (size_t i = 0; i < 3; ++i) shift[i] = side.lattice.origin[i], shift_reach += std::abs(shift[i]);
+}
+
+RaycastSearch::RaycastSearch(const RaycastBody& of_all, const Ray& world_ray, bool any_hit) noexcept
+    : body(of_all), ray(place_ray(of_all, world_ray)), any(any_hit) {}
+
+} // namespace query
+
+namespace {
+
+// Completes what is hit.
+void complete_hit(const query::RaycastSearch& search, const Ray& ray, RaycastResult& out) {
+    using glm::dvec3;
+    const query::RaycastBody& body = search.body;
+    const dvec3 direction = to_double(ray.direction);
+    out.verdict = Verdict::overlapping;
+    out.t = search.ray.begin + search.best.t;
+    out.node = search.node, out.triangle = search.triangle;
+    dvec3 normal = search.best.normal;
+    if (search.triangle != kNoTriangle && !(body.options.margin > 0))
+        normal = query::face_normal(query::place(body.side.tree, search.triangle));
+    // Scaled first: the products of tiny or huge edges may lie beyond a double's squares.
+    const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
+    normal = largest > 0 ? normal / largest * body.rotation : -direction;
+    out.point = to_float(to_double(ray.origin) + out.t * direction);
+    out.normal = to_float(normal / glm::length(normal));
+}
+
+void complete(const query::RaycastSearch& search, const Ray& ray, RaycastResult& out) {
+    out.stats = search.stats;
+    out.stats.deepest_level = search.body.side.tree.level_of(search.deepest);
+    if (search.finished && !search.found) {
+        out.verdict = Verdict::separated, out.clear = ray.max_t;
+        return;
     }
+    if (search.found) complete_hit(search, ray, out);
+    const double clear = std::min(search.clear, search.found ? search.best.t : search.ray.length);
+    out.clear = search.ray.begin + std::max(0.0, clear);
+}
 
-private:
-    const query::PlacedEllipsoid root_;
-    const glm::dvec3 translation_;
-    const glm::dmat3 rotation_;   ///< from the world to the body
-    query::RaycastSearch search_; ///< without a stack if the scratch is too small
-};
+// No more rays than that, or than the body takes at once.
+template <size_t kMost>
+void cast_some(const query::RaycastBody& body, std::span<const Ray> rays, std::span<RaycastResult> out, bool any) {
+    using query::RaycastSearch;
+    alignas(RaycastSearch) std::byte memory[kMost * sizeof(RaycastSearch)];
+    auto* const searches = reinterpret_cast<RaycastSearch*>(memory);
+    size_t of[kMost], count = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        out[i] = {};
+        const RaycastSearch& search = *std::construct_at(searches + count, body, rays[i], any);
+        if (!search.ray.valid) continue;
+        if (search.ray.empty)
+            out[i].verdict = Verdict::separated, out[i].clear = rays[i].max_t;
+        else
+            of[count++] = i;
+    }
+    if (count == 0) return;
+    query::traverse({searches, count});
+    for (size_t i = 0; i < count; ++i) complete(searches[i], rays[of[i]], out[of[i]]);
+}
+
+RaycastResult cast(const query::RaycastBody& body, const Ray& ray, bool any) {
+    RaycastResult out;
+    if (body.stacks) cast_some<1>(body, {&ray, 1}, {&out, 1}, any);
+    return out;
+}
 
 } // namespace
 
 RaycastResult raycast(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                       const QueryOptions& options) noexcept {
-    return RayCaster(tree, pose, context, options).cast(ray, false);
+    return cast({tree, pose, context, options, nullptr}, ray, false);
 }
 
 void raycast(const TreeView& tree, const Pose& pose, std::span<const Ray> rays, std::span<RaycastResult> out,
              Scratch context, const QueryOptions& options) noexcept {
-    RayCaster caster(tree, pose, context, options);
-    for (size_t i = 0; i < std::min(rays.size(), out.size()); ++i) out[i] = caster.cast(rays[i], false);
+    const query::RaycastBody body(tree, pose, context, options, nullptr);
+    const size_t count = std::min(rays.size(), out.size());
+    if (!body.stacks) std::fill_n(out.begin(), count, RaycastResult{});
+    for (size_t i = 0; body.stacks && i < count; i += body.rays_at_once) {
+        const size_t some = std::min<size_t>(count - i, body.rays_at_once);
+        cast_some<query::kRaysAtOnce>(body, rays.subspan(i, some), out.subspan(i, some), false);
+    }
 }
 
 RaycastResult raycast_any(const TreeView& tree, const Pose& pose, const Ray& ray, Scratch context,
                           const QueryOptions& options) noexcept {
-    return RayCaster(tree, pose, context, options).cast(ray, true);
+    return cast({tree, pose, context, options, nullptr}, ray, true);
 }
 
 RaycastResult raycast_cut(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
                           Scratch context, const QueryOptions& options) noexcept {
-    return RayCaster(tree, pose, context, options, growth.data()).cast(ray, false);
+    return cast({tree, pose, context, options, growth.data()}, ray, false);
 }
 
 RaycastResult raycast_cut_any(const TreeView& tree, const Pose& pose, const Ray& ray, std::span<const float> growth,
                               Scratch context, const QueryOptions& options) noexcept {
-    return RayCaster(tree, pose, context, options, growth.data()).cast(ray, true);
+    return cast({tree, pose, context, options, growth.data()}, ray, true);
 }
 
 } // namespace prolate

@@ -1,9 +1,14 @@
-// Ray against tree: eight children at a time, nearest first.
+// Rays against a tree: eight children at a time, nearest first.
 //
 // The kernel (lanes-inl.hpp) gives a lower bound of the parameter at which the ray enters each child: its box, and its
 // ellipsoid, too, unless the tree is exact and the ray thin. (Boxes alone take 20 % less time on the horse, the bunny
 // and machine parts, and 2 to 6 % on coarse meshes.) Children wait on a stack, the nearest on top, and are skipped when
-// the best hit so far lies before their bound. Leaves are decided in double precision (ray.hpp).
+// the best hit so far lies before their bound. Leaves are decided in double precision (ray.hpp): ellipsoids when their
+// turn comes, triangles at once, those of all leaves of a block together (triangle_lanes-inl.hpp).
+//
+// A ray spends most of its time waiting: for what it loads, for the last of a chain of operations, for a guess of what
+// comes next that was wrong. So several rays take each step in turn, those without branches first, and wait together.
+// None knows of the others: answers and counts are those of a ray by itself.
 //
 // Sound because a node's bounding volume holds all leaves below it: where the ray misses the node, it misses these. To
 // meet the ellipsoids of a cut, also of an exact tree (raycast_cut), the nodes' own are grown until they hold all below
@@ -14,6 +19,7 @@
 #define HWY_TARGET_INCLUDE "query/raycast/search.cpp"
 #include "query/simd/targets.hpp" // before foreach_target.h
 
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 
 #include "query/raycast/lanes-inl.hpp"
@@ -24,118 +30,310 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <span>
 
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 namespace {
 
-template <bool kThick, bool kGrown> class RaycastTraversal {
-public:
-    explicit RaycastTraversal(RaycastSearch& search) : s_(search) {}
+enum class Meets {
+    triangles,  // of an exact tree, by a thin ray
+    ellipsoids, // and what is thin
+    near,       // what comes within the margin
+    grown,      // ellipsoids of a cut
+    near_grown
+};
 
-    // False if the tests ran out.
-    bool run() {
-        if (!test(0, 1)) return !leave_aside(0);
-        while (size_ > 0) {
-            const Scratch::Entry e = s_.stack[--size_];
-            if (e.bound > limit_) continue;
-            const uint32_t lane = e.node_a % kBlockLanes;
-            const std::byte* const block = s_.side.block(e.node_a);
-            if ((s_.side.leaf_lanes(e.node_a - lane, block) >> lane & 1) != 0 || e.node_a >= s_.side.limit_from) {
-                const TriangleRange triangles = s_.side.tree.triangles(e.node_a);
-                if (triangles.count > s_.left()) return !leave_aside(e.bound);
-                if (!meet(e.node_a, triangles)) continue;
-                if (s_.any) return leave_aside(std::numeric_limits<float>::infinity());
-                const double limit = s_.best.t / s_.ray.length;
-                // Rounded up; below the kernel's margin anyway, as is the division's rounding.
-                if (limit < 1) limit_ = std::nextafter(static_cast<float>(limit), 1.0f);
-                continue;
+template <Meets kMeets, bool kAlone> class RaycastTraversal {
+public:
+    // Begins at the root. False if there is nothing to do.
+    bool begin(RaycastSearch& search, size_t place) {
+        s_ = &search, side_ = &search.body.side;
+        base_ = top_ = search.body.stacks + place * search.body.stack_size;
+        left_ = search.body.options.max_pair_tests;
+        place_in_lattice(search);
+        return open(0, 1, 0);
+    }
+
+    // The lanes of the block that may be met become a family on the stack, but for leaves whose triangles come next.
+    HWY_INLINE void test() {
+        const LatticeRay& ray = lattice_ray_;
+        const int32_t step_exponent = side_->lattice.step_exponent;
+        const Float limit = set(limit_);
+        const size_t count = std::min<size_t>(siblings_, kBlockLanes);
+        top_->first = first_, waiting_lanes_ = 0;
+        const auto keep = [&](size_t i, Float enter, Float leave) {
+            Mask met = (enter <= leave) & hn::FirstN(FloatTag(), count - std::min(count, i));
+            if constexpr (kMeets == Meets::triangles) {
+                const Mask leaf = hn::RebindMask(FloatTag(), load_widened<int8_t>(block_ + kBlockCount + i) <
+                                                                 hn::Zero(hn::RebindToSigned<FloatTag>()));
+                leaves_ |= bits(met & leaf) << i;
+                met = hn::AndNot(leaf, met);
             }
-            base_ = size_;
-            if (!for_each_block(children_in(block, lane),
-                                [&](uint32_t first, uint32_t count) { return test(first, count); }))
-                return !leave_aside(e.bound);
+            store_unaligned(choose(met, enter, set(kNever)), top_->bounds + i);
+            waiting_lanes_ |= bits(met) << i;
+        };
+        [[maybe_unused]] BoxRay boxes;
+        if constexpr (!kGrown) boxes = box_ray(block_, ray);
+        for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+            if constexpr (kGrown) {
+                const LaneNodes nodes =
+                    grown(load_nodes(block_, i, step_exponent), load_unaligned(s_->body.growth + first_ + i));
+                keep(i, entry_lanes<kThick>(nodes, ray, limit), limit);
+            } else {
+                BoxTimes in = box_times(block_, i, ray, boxes, limit);
+                if constexpr (kMeets != Meets::triangles)
+                    if (!all(in.enter > in.leave))
+                        in.enter = max(in.enter, entry_lanes<kThick>(load_nodes(block_, i, step_exponent), ray, limit));
+                keep(i, in.enter, in.leave);
+            }
         }
-        return true;
+        siblings_ -= static_cast<uint32_t>(count);
+    }
+
+    // Up to four triangles of these leaves.
+    bool gather_triangles() {
+        if (leaves_ != 0) gather();
+        return has_triangles();
+    }
+    bool has_triangles() const { return waiting_ != 0; }
+    HWY_INLINE void test_triangles() {
+        hits_ =
+            hit_four(side_->tree, triangles_, s_->ray, s_->body.root.reach, s_->found ? s_->best.t : s_->ray.length);
+    }
+    // True if there are more of them.
+    bool meet_triangles() {
+        bool better = false;
+        for (uint32_t rest = hits_.certain; rest != 0; rest &= rest - 1) {
+            const auto i = static_cast<uint32_t>(std::countr_zero(rest));
+            if (s_->found && !(hits_.t[i] < s_->best.t)) continue;
+            s_->found = better = true, s_->best.t = hits_.t[i];
+            s_->node = nodes_[i], s_->triangle = triangles_.index[i];
+        }
+        for (uint32_t rest = hits_.open; rest != 0; rest &= rest - 1) {
+            const auto i = static_cast<uint32_t>(std::countr_zero(rest));
+            better = s_->meet_triangle(nodes_[i], triangles_.index[i]) || better;
+        }
+        if (better) taken();
+        waiting_ = 0;
+        return gather_triangles();
+    }
+
+    // Turns to the next block. False if the search ends.
+    bool next() {
+        if (done_) return end(siblings_ > 0 ? bound_ : kNever);
+        if (!s_->finished) return end(bound_);
+        if (std::has_single_bit(waiting_lanes_) && siblings_ == 0) { // as it is most often, and sooner found
+            const auto lane = static_cast<uint32_t>(std::countr_zero(waiting_lanes_)) % kBlockLanes;
+            const float bound = top_->bounds[lane];
+            if (bound <= limit_ && !ends(first_, block_, lane)) return open_children(block_, lane, bound);
+        }
+        push();
+        if (siblings_ > 0) return open(first_ + kBlockLanes, siblings_, bound_);
+        while (top_ != base_) {
+            RayFamily& family = top_[-1];
+            const uint32_t lane = nearest(family);
+            const float bound = family.bounds[lane];
+            family.waiting &= ~(1u << lane), family.bounds[lane] = kNever;
+            if (bound > limit_) family.waiting = 0;
+            if (family.waiting == 0) --top_;
+            if (bound > limit_) continue;
+            const std::byte* const block = block_of(family.first);
+            if (!ends(family.first, block, lane)) return open_children(block, lane, bound);
+            if (!meet(family.first + lane)) return end(bound);
+            if (done_) return end(kNever);
+        }
+        return false;
+    }
+    // Of what is told after the search.
+    void finish() const {
+        s_->stats.pair_tests = s_->body.options.max_pair_tests - left_ - s_->stats.triangle_tests;
+        s_->stats.block_tests = blocks_, s_->deepest = deepest_;
     }
 
 private:
-    // A leaf, or a node that stands for what is below it. True if a hit is the best now.
-    bool meet(uint32_t at, const TriangleRange& triangles) {
-        if (triangles.count == 0 || kGrown) return s_.meet(at);
-        s_.stats.triangle_tests += triangles.count;
-        bool taken = false;
-        for (uint32_t i = 0; i < triangles.count; i += kFour) {
-            const uint32_t first = triangles.first + i, count = std::min(triangles.count - i, uint32_t{kFour});
-            uint32_t open = (1u << count) - 1;
-            if (!(s_.options.margin > 0)) { // what lies beyond the best hit is not taken
-                const double farthest = s_.found ? s_.best.t : s_.ray.length;
-                open = may_hit(s_.side.tree, first, count, s_.ray, s_.reach, farthest);
-            }
-            for (; open != 0; open &= open - 1)
-                taken = s_.meet_triangle(at, first + static_cast<uint32_t>(std::countr_zero(open))) || taken;
-        }
-        return taken;
-    }
+    static constexpr bool kThick = kMeets == Meets::near || kMeets == Meets::near_grown,
+                          kGrown = kMeets == Meets::grown || kMeets == Meets::near_grown;
+    static constexpr float kNever = std::numeric_limits<float>::infinity();
 
-    // One block: puts the lanes that may be met on the stack, the nearest of the family on top.
-    bool test(uint32_t first, uint32_t count) {
-        if (count > s_.left()) return false;
-        s_.stats.pair_tests += count, ++s_.stats.block_tests;
-        s_.side.deepest = std::max(s_.side.deepest, first + count - 1);
-        alignas(32) float entries[kBlockLanes];
-        const std::byte* const block = kGrown ? s_.side.tree.raw().block(first / kBlockLanes) : s_.side.block(first);
-        const int32_t step_exponent = s_.side.lattice.step_exponent;
-        const Float limit = set(limit_);
-        uint32_t open = 0;
-        const auto keep = [&](Float enter, size_t i) {
-            store(enter, entries + i);
-            open |= bits(enter <= limit) << i;
-        };
-        if constexpr (kGrown) {
-            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
-                const LaneNodes nodes =
-                    grown(load_nodes(block, i, step_exponent), load_unaligned(s_.growth + first + i));
-                keep(entry_lanes<kThick>(nodes, s_.lattice_ray, limit), i);
+    const std::byte* block_of(uint32_t first) const {
+        if constexpr (kMeets == Meets::triangles) return side_->blocks + size_t{first / kBlockLanes} * kBlockBytes;
+        return kGrown ? side_->tree.raw().block(first / kBlockLanes) : side_->block(first);
+    }
+    void push() {
+        top_->waiting = waiting_lanes_;
+        top_ += waiting_lanes_ != 0;
+        waiting_lanes_ = 0;
+    }
+    // Of those that wait, some of which there are.
+    HWY_INLINE static uint32_t nearest(const RayFamily& family) {
+        if constexpr (kAlone) { // what is likely is guessed well
+            uint32_t best = 0, rest = family.waiting;
+            float least = kNever;
+            for (; rest != 0; rest &= rest - 1) {
+                const auto lane = static_cast<uint32_t>(std::countr_zero(rest)) % kBlockLanes;
+                if (family.bounds[lane] <= least) best = lane, least = family.bounds[lane];
             }
+            return best;
         } else {
-            const BoxRay boxes = box_ray(block, s_.lattice_ray);
-            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
-                Float enter = box_entries(block, i, s_.lattice_ray, boxes, limit);
-                if ((kThick || !boxes_suffice_) && !all(enter > limit))
-                    enter = max(enter, entry_lanes<kThick>(load_nodes(block, i, step_exponent), s_.lattice_ray, limit));
-                keep(enter, i);
+            Float bounds = set(kNever);
+            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
+                bounds = min(bounds, load_unaligned(family.bounds + i));
+            const Float least = hn::MinOfLanes(FloatTag(), bounds);
+            uint32_t lanes = 0;
+            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
+                lanes |= bits(load_unaligned(family.bounds + i) == least) << i;
+            return static_cast<uint32_t>(std::bit_width(lanes)) - 1;
+        }
+    }
+    // Is this a leaf, or does it stand for what is below it? Leaves with triangles do not come here.
+    bool ends(uint32_t first, const std::byte* block, uint32_t lane) const {
+        if (first >= side_->limit_from) return true;
+        return kMeets != Meets::triangles && (side_->leaf_lanes(first, block) >> lane & 1) != 0;
+    }
+
+    HWY_INLINE bool open_children(const std::byte* block, uint32_t lane, float bound) {
+        return open(first_child(block, lane), load_le<uint8_t>(block + kBlockCount + lane), bound);
+    }
+    HWY_INLINE bool open(uint32_t first, uint32_t siblings, float bound) {
+        if (!afford(std::min(siblings, kBlockLanes))) return end(bound);
+        first_ = first, siblings_ = siblings, bound_ = bound, block_ = block_of(first);
+        ++blocks_, deepest_ = std::max(deepest_, first);
+        hwy::Prefetch(block_ + kBlockCount), hwy::Prefetch(block_ + kBlockBoxLow);
+        return true;
+    }
+    HWY_INLINE bool afford(uint32_t tests) {
+        s_->finished = tests <= left_;
+        if (s_->finished) left_ -= tests;
+        return s_->finished;
+    }
+
+    // The search ends here: `bound` and what waits on the stack is not looked at. Always false.
+    HWY_NOINLINE bool end(float bound) {
+        push();
+        for (; top_ != base_; --top_)
+            for (const float waits : top_[-1].bounds) bound = std::min(bound, waits);
+        s_->clear = double{bound} * s_->ray.length;
+        return false;
+    }
+
+    void place_in_lattice(const RaycastSearch& search) {
+        using Axes = hn::CappedTag<double, 4>;
+        const RaycastBody& body = search.body;
+        alignas(32) double origin[4], span[4];
+        for (size_t at = 0; at < 4; at += hn::MaxLanes(Axes())) { // behind three coordinates there are others
+            const auto per_step = hn::Set(Axes(), body.per_step), length = hn::Set(Axes(), search.ray.length);
+            const auto from = hn::LoadU(Axes(), &search.ray.origin.x + at);
+            const auto along = hn::LoadU(Axes(), &search.ray.direction.x + at);
+            hn::Store(from * per_step - hn::LoadU(Axes(), body.shift + at), Axes(), origin + at);
+            hn::Store(along * length * per_step, Axes(), span + at);
+        }
+        query::HWY_NAMESPACE::place_in_lattice(origin, span, search.ray.reach * body.per_step + body.shift_reach,
+                                               double{body.options.margin} * body.per_step, lattice_ray_);
+    }
+
+    // A hit is the best now.
+    void taken() {
+        const double limit = s_->best.t / s_->ray.length;
+        // Rounded up; below the kernel's margin anyway, as is the division's rounding.
+        if (limit < 1) limit_ = std::min(1.0f, next_above(static_cast<float>(limit)));
+        done_ = s_->any || !(s_->best.t > 0);
+    }
+    static float next_above(float x) { // x >= 0
+        return std::bit_cast<float>(std::bit_cast<uint32_t>(std::abs(x)) + 1);
+    }
+
+    // A leaf, or a node that stands for what is below it. False if the tests ran out.
+    bool meet(uint32_t at) {
+        const TriangleRange triangles = kGrown ? TriangleRange{} : side_->tree.triangles(at);
+        if (!afford(triangles.count)) return false;
+        s_->stats.triangle_tests += triangles.count;
+        bool better = triangles.count == 0 && s_->meet(at);
+        for (uint32_t i = 0; i < triangles.count; ++i) better = s_->meet_triangle(at, triangles.first + i) || better;
+        if (better) taken();
+        return true;
+    }
+
+    // Takes triangles off the leaves, if the tests suffice.
+    void gather() {
+        for (; leaves_ != 0 && waiting_ < RayTriangles::kLanes; leaves_ &= leaves_ - 1, of_leaf_ = 0) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(leaves_));
+            const uint32_t from = first_triangle(block_, lane),
+                           count = load_le<uint8_t>(block_ + kBlockCount + lane) - uint32_t{kTriangleLeaf};
+            if (of_leaf_ == 0) {
+                if (!afford(count)) break;
+                s_->stats.triangle_tests += count;
             }
+            while (of_leaf_ < count && waiting_ < RayTriangles::kLanes)
+                nodes_[waiting_] = first_ + lane, triangles_.index[waiting_++] = from + of_leaf_++;
+            if (of_leaf_ < count) return;
         }
-        for (open &= (1u << count) - 1; open != 0; open &= open - 1) {
-            const auto lane = static_cast<uint32_t>(std::countr_zero(open));
-            uint32_t at = size_++;
-            for (; at > base_ && s_.stack[at - 1].bound < entries[lane]; --at) s_.stack[at] = s_.stack[at - 1];
-            s_.stack[at] = {first + lane, 0, entries[lane], 0};
-        }
-        return true;
+        if (!s_->finished) leaves_ = 0;
+        for (uint32_t i = waiting_; i < RayTriangles::kLanes && waiting_ > 0; ++i) // one again, for want of others
+            nodes_[i] = nodes_[0], triangles_.index[i] = triangles_.index[0];
     }
 
-    // The search ends here: `bound` and what waits on the stack is not looked at. Always true.
-    bool leave_aside(float bound) {
-        double least = bound;
-        for (uint32_t i = 0; i < size_; ++i) least = std::min(least, double{s_.stack[i].bound});
-        s_.clear = least * s_.ray.length;
-        return true;
-    }
-
-    RaycastSearch& s_;
-    // Around a few triangles, boxes are about as close as ellipsoids, and cost a quarter.
-    const bool boxes_suffice_ = s_.side.tree.has_triangles();
-    uint32_t size_ = 0, base_ = 0;
-    float limit_ = 1; // parameter of the best hit
+    RaycastSearch* s_;
+    LatticeRay lattice_ray_;
+    const TreeSide* side_;
+    RayFamily *base_, *top_; // of the stack: what waits on it
+    uint64_t left_;          // tests
+    uint32_t blocks_ = 0, deepest_ = 0;
+    float limit_ = 1;   // parameter of the best hit
+    bool done_ = false; // nothing that waits matters
+    // The block that is looked at, how many siblings lie in it and after, and the bound of their parent.
+    const std::byte* block_;
+    uint32_t first_, siblings_;
+    float bound_;
+    uint32_t waiting_lanes_ = 0; // of it, at top_
+    // Leaves of it whose triangles are still to be met, the next of the first one's, and those at hand.
+    uint32_t leaves_ = 0, of_leaf_ = 0, waiting_ = 0, nodes_[RayTriangles::kLanes];
+    RayTriangles triangles_;
+    FourHits hits_;
 };
 
-bool traverse_target(RaycastSearch& search) {
-    const bool thick = search.lattice_ray.thickness > 0;
-    if (search.growth)
-        return thick ? RaycastTraversal<true, true>(search).run() : RaycastTraversal<false, true>(search).run();
-    return thick ? RaycastTraversal<true, false>(search).run() : RaycastTraversal<false, false>(search).run();
+template <Meets kMeets, size_t kMost> void traverse_rays(std::span<RaycastSearch> searches) {
+    using Traversal = RaycastTraversal<kMeets, kMost == 1>;
+    Traversal rays[kMost];
+    Traversal* active[kMost];
+    uint32_t left = 0;
+    for (size_t i = 0; i < searches.size(); ++i)
+        if (rays[i].begin(searches[i], i)) active[left++] = rays + i;
+    while (left > 0) {
+        for (uint32_t i = 0; i < left; ++i) active[i]->test();
+        bool triangles = false;
+        for (uint32_t i = 0; i < left; ++i) triangles = active[i]->gather_triangles() || triangles;
+        while (triangles) {
+            for (uint32_t i = 0; i < left; ++i)
+                if (active[i]->has_triangles()) active[i]->test_triangles();
+            triangles = false;
+            for (uint32_t i = 0; i < left; ++i)
+                if (active[i]->has_triangles()) triangles = active[i]->meet_triangles() || triangles;
+        }
+        uint32_t stay = 0;
+        for (uint32_t i = 0; i < left; ++i)
+            if (active[i]->next()) active[stay++] = active[i];
+        left = stay;
+    }
+    for (size_t i = 0; i < searches.size(); ++i) rays[i].finish();
+}
+
+template <size_t kMost> void traverse_some(std::span<RaycastSearch> searches) {
+    const RaycastBody& body = searches[0].body;
+    const bool thick = body.options.margin > 0;
+    const auto run = body.growth
+                         ? (thick ? traverse_rays<Meets::near_grown, kMost> : traverse_rays<Meets::grown, kMost>)
+                     : thick                          ? traverse_rays<Meets::near, kMost>
+                     : body.side.tree.has_triangles() ? traverse_rays<Meets::triangles, kMost>
+                                                      : traverse_rays<Meets::ellipsoids, kMost>;
+    run(searches);
+}
+
+void traverse_target(std::span<RaycastSearch> searches) {
+    if (searches.size() == 1)
+        traverse_some<1>(searches);
+    else
+        traverse_some<kRaysAtOnce>(searches);
 }
 
 } // namespace
@@ -145,8 +343,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace prolate::query {
 HWY_EXPORT(traverse_target);
-bool traverse(RaycastSearch& search) noexcept {
-    return HWY_DYNAMIC_DISPATCH(traverse_target)(search);
+void traverse(std::span<RaycastSearch> searches) noexcept {
+    HWY_DYNAMIC_DISPATCH(traverse_target)(searches);
 }
 } // namespace prolate::query
 #endif // HWY_ONCE

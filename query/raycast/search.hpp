@@ -1,4 +1,4 @@
-// One raycast() query: what the vectorised traversal (search.cpp) and the decisions at its leaves (leaves.cpp) share.
+// raycast() queries: what the vectorised traversal (search.cpp) and the decisions at its leaves (leaves.cpp) share.
 #pragma once
 
 #include "query/node/limits.hpp"
@@ -8,44 +8,71 @@
 
 #include <prolate/raycast.hpp>
 
-#include <cmath>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
 #include <cstdint>
+#include <limits>
+#include <span>
 
 namespace prolate::query {
 
-struct RaycastSearch {
-    // Of all rays.
-    TreeSide side;
-    const QueryOptions options; // sound
-    const float* const growth;  ///< of raycast_cut(): by slots; else null
-    Scratch::Entry* const stack;
-    const double reach; ///< at least that of every triangle
-    // Of one.
-    PlacedRay ray;
-    LatticeRay lattice_ray;
-    bool any; ///< stop at the first hit that is found
-    QueryStats stats;
-    bool found;
-    RayHit best;  ///< of the placed ray
-    double clear; ///< of the placed ray: the least bound of what was left aside
-    uint32_t node, triangle;
+inline constexpr uint32_t kRaysAtOnce = 8;
 
-    RaycastSearch(const TreeSide& tree_side, const QueryOptions& sound, const float* grown, Scratch::Entry* scratch,
-                  double triangle_reach) noexcept
-        : side(tree_side), options(sound), growth(grown), stack(scratch), reach(triangle_reach) {}
-    /// Makes ready for a ray.
-    void begin(const PlacedRay& placed, bool any_hit) noexcept;
+/// Siblings of a block that wait on a ray's stack.
+struct RayFamily {
+    float bounds[kBlockLanes]; ///< the ray enters them no sooner; infinite of those that are done with, or not met
+    uint32_t first;            ///< slot of the first
+    uint32_t waiting;          ///< lanes that still do
+};
+/// The most families that wait while a ray is at a leaf, and room for the next one.
+inline uint32_t ray_stack_size(const TreeView& tree) noexcept {
+    return blocks_for(tree.degree()) * (tree.level_count() - 1) + 2;
+}
+
+/// A tree at a pose: what many rays have in common.
+struct RaycastBody {
+    const TreeSide side;
+    const QueryOptions options;  // sound
+    const float* const growth;   ///< of raycast_cut(): by slots; else null
+    RayFamily* const stacks;     ///< null if the scratch is too small
+    const uint32_t stack_size;   ///< of each
+    const uint32_t rays_at_once; ///< stacks
+    const PlacedEllipsoid root;
+    const glm::dvec3 translation;
+    const glm::dmat3 rotation;             ///< from the world to the body
+    const double per_step;                 ///< lattice steps a metre
+    double shift[4] = {}, shift_reach = 0; ///< of its origin, steps, and the sum of their moduli
+
+    RaycastBody(const TreeView& tree, const Pose& pose, Scratch scratch, const QueryOptions& asked,
+                const float* grown) noexcept;
+};
+
+/// One ray.
+struct RaycastSearch {
+    const RaycastBody& body;
+    const PlacedRay ray;
+    const bool any; ///< stop at the first hit that is found
+    QueryStats stats = {};
+    uint32_t deepest = 0; ///< largest slot that was tested
+    bool finished = true; ///< false if the budget ran out
+    bool found = false;
+    RayHit best{}; ///< of the placed ray; hits of `triangle` have no normal
+    double clear =
+        std::numeric_limits<double>::infinity(); ///< of the placed ray: the least bound of what was left aside
+    uint32_t node = 0, triangle = kNoTriangle;
+
+    RaycastSearch(const RaycastBody& of_all, const Ray& world_ray, bool any_hit) noexcept;
 
     /// Decides on the ellipsoid of the leaf `at`, or of a node that stands for what is below it. True if a hit is the
     /// best now.
     bool meet(uint32_t at) noexcept;
     /// The same of one triangle of a leaf.
     bool meet_triangle(uint32_t leaf, uint32_t triangle) noexcept;
-    /// Tests left of the budget.
-    uint64_t left() const noexcept { return tests_left(options.max_pair_tests, stats.tests()); }
 };
 
-/// The traversal: finds the first hit, or any. False if the budget ran out.
-bool traverse(RaycastSearch& search) noexcept;
+/// The traversal: finds the first hit of each, or any. Of rays that are valid and not empty, all against one body and
+/// no more than body.rays_at_once.
+void traverse(std::span<RaycastSearch> searches) noexcept;
 
 } // namespace prolate::query

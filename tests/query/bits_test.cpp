@@ -299,7 +299,7 @@ TEST(Bits, Sweep) {
 }
 
 TEST(Bits, Raycast) {
-    expect_bits(2414394738790867320u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(14280696937879782652u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_a.translation, to = p.pose_b.translation;
         const Ray ray{from, {to.x - from.x, to.y - from.y, to.z - from.z}, 2};
         for (const float margin : {0.0f, 0.05f}) {

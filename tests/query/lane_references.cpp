@@ -108,14 +108,14 @@ float box_entry(const std::byte* block, uint32_t lane, const LatticeRay& ray, fl
         const auto side = [&](size_t at) {
             return static_cast<float>(load_le<uint8_t>(block + at + kBlockLanes * i + lane));
         };
-        const float per_step = boxes.per_step(i), inverse = ray.inverse[i] * boxes.step(i);
-        const auto origin = static_cast<float>(ray.origin[i] - static_cast<double>(boxes.origin(i)));
-        const float margin = ray.thickness + (ray.slack + kLaneMargin * std::abs(origin));
-        const bool forward = !(ray.inverse[i] < 0);
-        const float near = (forward ? origin + margin : origin - margin) * per_step;
-        const float far = (forward ? origin - margin : origin + margin) * per_step;
-        const float in = (side(forward ? kBlockBoxLow : kBlockBoxHigh) - near) * inverse;
-        const float out = (side(forward ? kBlockBoxHigh : kBlockBoxLow) - far) * inverse;
+        const float inverse = ray.inverse[i], per_step = inverse * boxes.step(i);
+        const float begins = static_cast<float>(boxes.origin(i)) - ray.origin[i];
+        const float margin = (ray.thickness + ray.slack) + kLaneMargin * std::abs(begins);
+        const bool forward = !(inverse < 0);
+        const float near = (forward ? begins - margin : begins + margin) * inverse;
+        const float far = (forward ? begins + margin : begins - margin) * inverse;
+        const float in = side(forward ? kBlockBoxLow : kBlockBoxHigh) * per_step + near;
+        const float out = side(forward ? kBlockBoxHigh : kBlockBoxLow) * per_step + far;
         if (in > enter) enter = in;
         if (out < leave) leave = out;
     }

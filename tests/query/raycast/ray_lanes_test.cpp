@@ -31,6 +31,10 @@ AxisMask block_mask(const std::byte* block, int32_t step_exponent, const Lattice
                        : axis_block<2>(block, step_exponent, point);
 }
 
+void placed_ray(const double (&origin)[4], const double (&span)[4], double reach, double thickness, LatticeRay& out) {
+    place_in_lattice(origin, span, reach, thickness, out);
+}
+
 void block_entries(const std::byte* block, int32_t step_exponent, const LatticeRay& ray, float limit,
                    float entries[kBlockLanes]) {
     for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
@@ -43,8 +47,11 @@ void block_entries(const std::byte* block, int32_t step_exponent, const LatticeR
 
 void block_box_entries(const std::byte* block, const LatticeRay& ray, float limit, float entries[kBlockLanes]) {
     const BoxRay boxes = box_ray(block, ray);
-    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
-        store_unaligned(box_entries(block, i, ray, boxes, set(limit)), entries + i);
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+        const BoxTimes times = box_times(block, i, ray, boxes, set(limit));
+        const Float never = set(std::numeric_limits<float>::infinity());
+        store_unaligned(choose(times.enter > times.leave, never, times.enter), entries + i);
+    }
 }
 
 } // namespace prolate::query::HWY_NAMESPACE
@@ -53,6 +60,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace prolate::query {
 HWY_EXPORT(block_mask);
+HWY_EXPORT(placed_ray);
 HWY_EXPORT(block_entries);
 HWY_EXPORT(block_box_entries);
 
@@ -108,13 +116,14 @@ Grazing grazing(Random& random, const Ellipsoid& e, const LatticeInfo& lattice) 
 // As a query would place it, all in double.
 LatticeRay place(const Grazing& g, const LatticeInfo& lattice, double slack_factor, double thickness = 0) {
     const double per_step = std::ldexp(1.0, -lattice.step_exponent);
-    double origin[3], span[3], reach = 0;
+    double origin[4] = {}, span[4] = {}, reach = 0;
     for (size_t i = 0; i < 3; ++i) {
         origin[i] = static_cast<double>(g.origin[i]) * per_step - lattice.origin[i];
         span[i] = static_cast<double>(g.span[i]) * per_step;
         reach += std::abs(origin[i]) + std::abs(span[i]) + 2 * std::abs(static_cast<double>(lattice.origin[i]));
     }
-    LatticeRay ray = lattice_ray(origin, span, reach, thickness * per_step);
+    LatticeRay ray;
+    HWY_DYNAMIC_DISPATCH(placed_ray)(origin, span, reach, thickness * per_step, ray);
     ray.slack *= static_cast<float>(slack_factor);
     return ray;
 }

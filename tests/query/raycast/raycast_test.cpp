@@ -543,20 +543,20 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
     }
 }
 
-TEST(Raycast, ABatchAnswersAsSingleRaysDo) {
-    const auto scene = scenes::exact_tree(shapes::torus(1, 0.3f, 40, 16));
-    const auto tree = *TreeView::open(scene.bytes);
-    const float nan = std::numeric_limits<float>::quiet_NaN();
+// With a scratch for many rays at once, and with one that suffices for one alone.
+void expect_batch_as_single(const TreeView& tree, const Mesh& aim, const QueryOptions& options) {
     Random random(8);
-    for (const float margin : {0.0f, 0.01f}) {
-        const Pose pose = scenes::pose_at(random, 2);
-        std::vector<Ray> rays;
-        for (int n = 0; n < 300; ++n) rays.push_back(aimed(random, scene.mesh, pose, 1));
-        rays[7].origin.x = nan, rays[9].direction = {0, 0, 0}, rays[11].max_t = -1;
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const Pose pose = scenes::pose_at(random, 2);
+    std::vector<Ray> rays;
+    for (int n = 0; n < 300; ++n) rays.push_back(aimed(random, aim, pose, 1));
+    rays[7].origin.x = nan, rays[9].direction = {0, 0, 0}, rays[11].max_t = -1;
+    std::vector<std::byte> least(scratch_size(tree));
+    for (const Scratch scratch : {Scratch(context()), Scratch(least)}) {
         std::vector<RaycastResult> out(rays.size() + 1);
-        raycast(tree, pose, rays, out, context(), {.margin = margin});
+        raycast(tree, pose, rays, out, scratch, options);
         for (size_t i = 0; i < rays.size(); ++i) {
-            const RaycastResult single = cast(tree, pose, rays[i], {.margin = margin});
+            const RaycastResult single = cast(tree, pose, rays[i], options);
             ASSERT_EQ(out[i].verdict, single.verdict) << i;
             ASSERT_EQ(out[i].t, single.t);
             ASSERT_EQ(out[i].clear, single.clear);
@@ -565,12 +565,38 @@ TEST(Raycast, ABatchAnswersAsSingleRaysDo) {
             ASSERT_EQ(out[i].node, single.node);
             ASSERT_EQ(out[i].triangle, single.triangle);
             ASSERT_EQ(out[i].stats.tests(), single.stats.tests());
+            ASSERT_EQ(out[i].stats.block_tests, single.stats.block_tests);
             ASSERT_EQ(out[i].stats.deepest_level, single.stats.deepest_level);
         }
         EXPECT_EQ(out[7].verdict, Verdict::undecided);
         EXPECT_EQ(out[11].verdict, Verdict::separated);
         EXPECT_EQ(out.back().t, RaycastResult{}.t); // only as many as there are rays
     }
+}
+
+TEST(Raycast, ABatchAnswersAsSingleRaysDo) {
+    Random random(9);
+    const auto scene = scenes::exact_tree(shapes::torus(1, 0.3f, 40, 16));
+    const auto cloud = scenes::tree(random, scenes::cloud(random, 900), {.degree = 12, .stop_probability = 0.1});
+    for (const auto& bytes : {scene.bytes, cloud.bytes})
+        for (const float margin : {0.0f, 0.01f})
+            for (const uint64_t budget : {uint64_t{40}, std::numeric_limits<uint64_t>::max()})
+                for (const uint32_t level : {2u, kMaxLevels})
+                    expect_batch_as_single(*TreeView::open(bytes), scene.mesh,
+                                           {.max_level = level, .max_pair_tests = budget, .margin = margin});
+}
+
+// Beyond a float's reach nothing is culled, and the doubles say what they can.
+TEST(Raycast, FromVeryFarNothingIsSaidToMiss) {
+    const auto scene = scenes::exact_tree(shapes::torus(1, 0.3f, 40, 16));
+    Random random(10);
+    for (const float far : {1e8f, 1e13f, 1e18f, 1e25f, 1e30f})
+        for (int i = 0; i < 20; ++i) {
+            const auto d = random.direction();
+            const Vec3 from = scenes::to_float({double{far} * d[0], double{far} * d[1], double{far} * d[2]});
+            const RaycastResult r = cast(*TreeView::open(scene.bytes), {}, {from, {-from.x, -from.y, -from.z}});
+            EXPECT_NE(r.verdict, far < 1e9f ? Verdict::undecided : Verdict::separated) << far;
+        }
 }
 
 TEST(Raycast, ClosedMeshesHaveNoHoles) {
