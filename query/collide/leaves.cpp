@@ -21,9 +21,7 @@ constexpr double kInOnePlane = 0x1p-36;
 CollideSearch::CollideSearch(const TreeView& tree_a, const TreeView& tree_b, const RelativePose& pose_b_to_a,
                              Scratch context, const QueryOptions& query_options) noexcept
     : a(tree_side(tree_a, query_options.max_level)), b(tree_side(tree_b, query_options.max_level)), b_to_a(pose_b_to_a),
-      lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
-      lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(query_options)),
-      stack(context.entries()) {}
+      options(sound(query_options)), stack(context.entries()) {}
 
 void CollideSearch::set_skin(float distance) noexcept {
     skin = distance;

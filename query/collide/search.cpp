@@ -10,6 +10,9 @@
 // Sound because a node's bounding volume holds all leaves below it: if B is separated from A's child i, no leaf of B
 // meets one under that child.
 //
+// Of the roots, where both have one block of children, these are tried at once instead: B's are placed together, and
+// those that meet the box around A are tested against A's. So small trees end soon.
+//
 // Depth first, and of the children that meet, the deepest overlap first: bodies that touch are found out soon, and for
 // bodies that do not the order makes no difference.
 //
@@ -50,22 +53,30 @@ template <bool kMargin, bool kSifts> class CollideTraversal {
 
 public:
     explicit CollideTraversal(CollideSearch& search)
-        : s_(search),
-          stack_(search.stack), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}} {}
+        : s_(search), stack_(search.stack),
+          b_to_a_(lattice_pose(search.b_to_a, search.b.lattice, search.a.lattice)), sides_{{search.a, b_to_a_},
+                                                                                           {search.b, a_to_b_}} {}
 
     Verdict run() {
-        const Verdict verdict = descend();
+        const Verdict verdict = descend_from_roots();
         s_.stats.pair_tests = pair_tests_, s_.stats.block_tests = block_tests_;
         s_.a.deepest = sides_[0].deepest, s_.b.deepest = sides_[1].deepest;
         return verdict;
     }
 
 private:
-    Verdict descend() {
-        // The roots, as if B's were the only child of a node that meets everything.
+    Verdict descend_from_roots() {
+        const ChildRange in_a = one_block(sides_[0]), in_b = one_block(sides_[1]);
+        const bool sifts_triangles = kSifts && have_hulls_; // which go by all that was found before
+        if (!sifts_triangles && in_a.count > 0 && in_b.count > 0) return descend_from(in_a, in_b);
+        // As if B's root were the only child of a node that meets everything.
         if (budget() < 1) return Verdict::undecided;
         pair_tests_ = 1;
         if (test_all(kOpensB, {0, 1}, 0, s_.a.tree.is_leaf(0) ? kOtherIsLeaf : 0)) return stopped();
+        return descend();
+    }
+    // What is on the stack.
+    Verdict descend() {
         while (size_ > 0) {
             auto e = stack_[--size_];
             if (kSifts && s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
@@ -158,16 +169,30 @@ private:
         return left - std::min(left, pair_tests_ - s_.stats.pair_tests);
     }
 
+    HWY_NOINLINE void place_a() {
+        a_to_b_ = lattice_pose(inverse(s_.b_to_a), s_.a.lattice, s_.b.lattice);
+        have_a_to_b_ = true;
+    }
+
     // One block, B's if kOpensB is given, against a node of the other tree: decides on the leaves that meet, and pushes
     // the other pairs that do, the deepest last. True to stop the query.
     HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, uint32_t of_parent) {
+        if (open != 0 && !have_a_to_b_) place_a();
+        const Side& side = sides_[open];
+        const std::byte* const block = side.block(first);
+        return test(open, first, count, other, sides_[open].place(sides_[open ^ kOpensB], other).single, of_parent,
+                    [&](size_t lane) { return load_nodes(block, lane, side.lattice.step_exponent); });
+    }
+    // `single`: the other node, placed. `nodes(i)`: those of the block from lane i on.
+    template <class Nodes>
+    HWY_INLINE bool test(uint32_t open, uint32_t first, uint32_t count, uint32_t other, const Single& single,
+                         uint32_t of_parent, Nodes&& nodes) {
         const uint32_t other_is_leaf = of_parent & kOtherIsLeaf;
         const uint32_t inherited = of_parent & (kSifts ? kInOnePlane | CollideSearch::kSiftBits : kInOnePlane);
         Side& side = sides_[open];
         const std::byte* const block = side.block(first);
         ++block_tests_;
         side.deepest = std::max(side.deepest, first + count - 1);
-        const Single& single = side.place(sides_[open ^ kOpensB], other).single;
         const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
         uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
         if (meet == 0) return false;
@@ -175,7 +200,7 @@ private:
         Kept kept;
         const Float margin = set(lattice_margin);
         for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
-            const LaneTerms t = evaluate(load_nodes(block, i, side.lattice.step_exponent), single);
+            const LaneTerms t = evaluate(nodes(i), single);
             met |= bits(!separated<kMargin>(t, margin)) << i;
             larger |= bits(t.size > single.size) << i;
             kept.keep(t, i);
@@ -235,6 +260,69 @@ private:
         return false;
     }
 
+    // The roots, where both have one block of children: B's children are placed all at once, and those that meet the
+    // box of A's root are tested against A's, the nearest first, and with what comes of it done before the next.
+    HWY_NOINLINE Verdict descend_from(const ChildRange& in_a, const ChildRange& in_b) {
+        if (in_b.count > budget()) return Verdict::undecided;
+        LaneNodes nodes_a[kBlockLanes / kFloatLanes];
+        for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
+            nodes_a[i / kFloatLanes] = load_nodes(sides_[0].block(in_a.first), i, sides_[0].lattice.step_exponent);
+        PlacedBlock placed;
+        const std::byte* const block = sides_[1].block(in_b.first);
+        place_block(block, b_to_a_, placed);
+        const uint32_t leaves = sides_[1].leaf_lanes(in_b.first, block);
+        sides_[1].deepest = in_b.first + in_b.count - 1;
+        pair_tests_ = in_b.count, block_tests_ = 1;
+        const auto nodes = [&](size_t i) -> const LaneNodes& { return nodes_a[i / kFloatLanes]; };
+        alignas(64) float far[kBlockLanes];
+        for (uint32_t near = near_root(placed, (1u << in_b.count) - 1, far); near != 0;) {
+            auto lane = static_cast<uint32_t>(std::countr_zero(near));
+            for (uint32_t rest = near & (near - 1); rest != 0; rest &= rest - 1)
+                if (const auto next = static_cast<uint32_t>(std::countr_zero(rest)); far[next] < far[lane]) lane = next;
+            near &= ~(1u << lane);
+            if (in_a.count > budget()) return Verdict::undecided;
+            pair_tests_ += in_a.count;
+            if (test(0, in_a.first, in_a.count, in_b.first + lane, placed[lane], (leaves >> lane & 1) * kOtherIsLeaf,
+                     nodes))
+                return stopped();
+            if (const Verdict verdict = descend(); verdict != Verdict::separated) return verdict;
+        }
+        return Verdict::separated;
+    }
+    // The children of a root, if they are a block.
+    static ChildRange one_block(const Side& side) {
+        const ChildRange children = children_in(side.block(0), 0);
+        return side.limit_from > 0 && side.leaves_from > 0 && children.count <= kBlockLanes ? children
+                                                                                            : ChildRange{0, 0};
+    }
+    // B's lanes, as bits, that boxes do not separate from A's root, and `far` off its center, by spheres. Says, too,
+    // whether one body may hold the other: not if all that there is of B lies on one side of A.
+    uint32_t near_root(const PlacedBlock& placed, uint32_t lanes, float (&far)[kBlockLanes]) {
+        const BlockBoxes boxes(sides_[0].block(0));
+        const float margin = kMargin ? margin_in(sides_[0]) : 0.0f;
+        uint32_t near = lanes;
+        bool on_one_side = false;
+        float middle[3];
+        for (size_t r = 0; r < 3; ++r) {
+            const auto at = [&](int32_t side) { // exact
+                return static_cast<float>(boxes.origin(r)) + static_cast<float>(side) * boxes.step(r);
+            };
+            const float low = at(boxes.low(r, 0)), high = at(boxes.high(r, 0));
+            uint32_t above = 0, below = 0;
+            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+                above |= bits(load(placed.low[r] + i) > high + margin) << i;
+                below |= bits(load(placed.high[r] + i) < low - margin) << i;
+            }
+            near &= ~(above | below);
+            on_one_side = on_one_side || (above & lanes) == lanes || (below & lanes) == lanes;
+            middle[r] = 0.5f * (low + high);
+        }
+        for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
+            store(length(load(placed.center, i) - set(middle)) - load(placed.size + i), far + i);
+        s_.roots_meet = !on_one_side;
+        return near;
+    }
+
     // Some or all children, where that is rare: in a loop with the usual case this would cost it registers.
     HWY_NOINLINE bool test_all(uint32_t open, ChildRange children, uint32_t other, uint32_t of_parent) {
         return !for_each_block(
@@ -256,6 +344,9 @@ private:
     uint64_t pair_tests_ = 0, block_tests_ = 0;
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
     const bool have_slabs_ = s_.a.has_slabs || s_.b.has_slabs;
+    const LatticePose b_to_a_;
+    LatticePose a_to_b_; // once it is asked for: small trees end before
+    bool have_a_to_b_ = false;
     Side sides_[2];
 };
 

@@ -1,7 +1,6 @@
 // One collide() query: what the vectorised traversal (search.cpp) and the decisions at its leaves (leaves.cpp) share.
 #pragma once
 
-#include "query/node/lattice.hpp"
 #include "query/node/limits.hpp"
 #include "query/node/order.hpp"
 #include "query/node/tree_side.hpp"
@@ -21,7 +20,6 @@ enum class Slabs : uint8_t { say_nothing, separated, in_one_plane };
 struct CollideSearch {
     TreeSide a, b;
     const RelativePose b_to_a;
-    const LatticePose lattice_b_to_a, lattice_a_to_b;
     const QueryOptions options; // sound
     Scratch::Entry* const stack;
     QueryStats stats;

@@ -68,6 +68,7 @@ private:
 
 Verdict look_inside(const TreeView& a, const TreeView& b, const RelativePose& b_to_a, QueryStats& stats,
                     uint64_t most_tests) noexcept {
+    if (!a.has_triangles() && !b.has_triangles()) return Verdict::separated;
     const Verdict first = InsideSearch(a, b, b_to_a, stats, most_tests).look();
     return first != Verdict::separated ? first : InsideSearch(b, a, inverse(b_to_a), stats, most_tests).look();
 }

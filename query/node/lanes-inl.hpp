@@ -84,6 +84,65 @@ HWY_INLINE LaneNodes load_nodes(const std::byte* block, size_t first, int32_t st
     return out;
 }
 
+/// All nodes of a block as Singles, in lanes: in the lattice that they are compared in.
+struct PlacedBlock {
+    using Lanes = float[kBlockLanes];
+    alignas(64) Lanes center[3];
+    alignas(64) Lanes factor[3][3]; // columns
+    alignas(64) Lanes diagonal[3], off_diagonal[3], low[3], high[3];
+    alignas(64) Lanes size, weight, slack;
+    double reach;
+
+    Single operator[](size_t lane) const {
+        Single s;
+        for (size_t k = 0; k < 3; ++k) {
+            s.center[k] = center[k][lane];
+            for (size_t c = 0; c < 3; ++c) s.factor[c][k] = factor[c][k][lane];
+            s.diagonal[k] = diagonal[k][lane], s.off_diagonal[k] = off_diagonal[k][lane];
+            s.low[k] = low[k][lane], s.high[k] = high[k][lane];
+        }
+        s.low[3] = s.high[3] = 0;
+        s.size = size[lane], s.weight = weight[lane], s.slack = slack[lane], s.reach = reach;
+        return s;
+    }
+};
+
+/// As place_here() of each node, but for centers in single precision and boxes that are those of the ellipsoids.
+///
+/// A center is M c + o, M of row norm s = pose.scale, both rounded: with 3 products and 3 sums,
+///     |dc1| <= 5 u sqrt(3) s |c| + 2 u |o|  <=  u (11 s |c| + 2 |c1|),
+/// where lanes above have u |c1|. The slack has kLaneMargin s |c| = 32 u s |c| more, twice as much again.
+HWY_INLINE void place_block(const std::byte* block, const LatticePose& pose, PlacedBlock& out) {
+    const float common = common_slack(pose.reach) + kLaneMargin * kLargestCenter * pose.scale;
+    const float(&m)[3][4] = pose.linear_rounded;
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+        const LaneNodes e = load_nodes(block, i, pose.exponent_from);
+        Float size_squared = set(0), at = set(0);
+        for (size_t r = 0; r < 3; ++r) {
+            const Float x = set(m[0][r]), y = set(m[1][r]), z = set(m[2][r]);
+            const Float center = x * e.center.x + y * e.center.y + z * e.center.z + static_cast<float>(pose.offset[r]);
+            const Float f0 = x * e.factor.l11 + y * e.factor.l21 + z * e.factor.l31,
+                        f1 = y * e.factor.l22 + z * e.factor.l32, f2 = z * e.factor.l33;
+            const Float square = f0 * f0 + f1 * f1 + f2 * f2;
+            store(center, out.center[r] + i), store(square, out.diagonal[r] + i);
+            store(f0, out.factor[0][r] + i), store(f1, out.factor[1][r] + i), store(f2, out.factor[2][r] + i);
+            size_squared = size_squared + square, at = at + abs(center);
+        }
+        const Float size = sqrt(size_squared), slack = common + kLaneMargin * (at + size);
+        store(size, out.size + i), store(1 / size, out.weight + i), store(slack, out.slack + i);
+        for (size_t r = 0; r < 3; ++r) {
+            const size_t next = (r + 1) % 3; // xy, yz, zx
+            const auto product = [&](size_t column) {
+                return load(out.factor[column][r] + i) * load(out.factor[column][next] + i);
+            };
+            store(product(0) + product(1) + product(2), out.off_diagonal[r] + i);
+            const Float center = load(out.center[r] + i), half = sqrt(load(out.diagonal[r] + i)) + slack;
+            store(center - half, out.low[r] + i), store(center + half, out.high[r] + i);
+        }
+    }
+    out.reach = pose.reach;
+}
+
 /// Bit i: the boxes do not separate lane i from the single.
 HWY_INLINE uint32_t boxes_meet(const std::byte* block, const Single& s, float margin) {
 #if HWY_TARGET == HWY_SCALAR

@@ -415,6 +415,43 @@ TEST(Agreement, LargerBudgetsOnlyTighten) {
     EXPECT_GT(enclosed, 0);
 }
 
+// ---- one within the other ----
+
+// Where no node of either meets what is at the surface of the other: only the boxes around all of them do.
+TEST(Agreement, WhatIsWellWithinABodyIsEnclosed) {
+    const scenes::ExactScene ball = scenes::exact_tree(shapes::icosphere(3)),
+                             ring = scenes::exact_tree(shapes::torus(1, 0.3f, 16, 8)),
+                             box = scenes::exact_tree(shapes::box(1, 2, 0.5f));
+    const TreeView large = *TreeView::open(ball.bytes),
+                   small[] = {*TreeView::open(ring.bytes), *TreeView::open(box.bytes), large};
+    Random random(77);
+    const auto context = std::make_unique<QueryContext>();
+    std::vector<MeetingPair> pairs(1);
+    for (int i = 0; i < 3000; ++i) {
+        const float scale = static_cast<float>(random.log_in(1e-3, 0.2));
+        const TreeView inner = *small[i % 3].scaled(scale);
+        Pose pose_a = scenes::pose_at(random, random.in(0, 3)), pose_b = pose_a;
+        pose_b.rotation = random.rotation();
+        const Point d = random.in_ball(); // the ball's faces are 0.98 off its center, all of `inner` within 2.3 scale
+        const double most = 0.97 - 2.4 * double{scale};
+        pose_b.translation.x += static_cast<float>(most * d[0]);
+        pose_b.translation.y += static_cast<float>(most * d[1]);
+        pose_b.translation.z += static_cast<float>(most * d[2]);
+        for (const bool exchanged : {false, true}) {
+            const TreeView &a = exchanged ? inner : large, &b = exchanged ? large : inner;
+            const Pose &p = exchanged ? pose_b : pose_a, &q = exchanged ? pose_a : pose_b;
+            const CollideResult one = collide(a, p, b, q, *context);
+            ASSERT_EQ(one.verdict, Verdict::overlapping) << i;
+            EXPECT_TRUE(one.enclosed);
+            EXPECT_TRUE(collide_all(a, p, b, q, pairs, *context).enclosed);
+            PairCache cache;
+            EXPECT_EQ(collide(a, p, b, q, *context, {.margin = 1e-3f}, &cache).verdict, Verdict::overlapping);
+            ContactManifolds manifolds;
+            EXPECT_EQ(contacts(a, p, b, q, manifolds, *context).verdict, Verdict::overlapping);
+        }
+    }
+}
+
 // ---- numbers that no length can be ----
 
 TEST(Agreement, MarginsThatAreNoLengths) {

@@ -43,6 +43,12 @@ uint32_t box_bits(const std::byte* block, const Single& single, float margin) {
     return boxes_meet(block, single, margin);
 }
 
+void place_blocks(const std::byte* block, const LatticePose& pose, Single out[kBlockLanes]) {
+    PlacedBlock placed;
+    place_block(block, pose, placed);
+    for (size_t lane = 0; lane < kBlockLanes; ++lane) out[lane] = placed[lane];
+}
+
 float reach_here(const std::byte* hull, float x, float y, float z, float width) {
     return hull_reach(hull, x, y, z, width);
 }
@@ -54,6 +60,7 @@ HWY_AFTER_NAMESPACE();
 namespace prolate::query {
 HWY_EXPORT(lane_gaps);
 HWY_EXPORT(box_bits);
+HWY_EXPORT(place_blocks);
 HWY_EXPORT(reach_here);
 
 namespace {
@@ -133,7 +140,13 @@ void hunt_blocks(Random& random, const Family& family, double least_gap, const F
         const double gap = random.log_in(least_gap, 0.3);
         hunt::part(e, pose_a, f, pose_b, normal, random.below(2) ? size * gap : -size * gap);
 
-        Single single = place(b.bytes.data(), other, lattice_pose(relative_pose(pose_a, pose_b), b.lattice, a.lattice));
+        const LatticePose pose = lattice_pose(relative_pose(pose_a, pose_b), b.lattice, a.lattice);
+        Single single = place(b.bytes.data(), other, pose);
+        if (k / 2 % 2 == 0) { // placed with its block
+            Single all[kBlockLanes];
+            HWY_DYNAMIC_DISPATCH(place_blocks)(b.bytes.data(), pose, all);
+            single = all[other];
+        }
         for (auto& column : single.factor)
             for (float& x : column) x *= fault.factor;
         for (size_t i = 0; i < 3; ++i) {
@@ -204,6 +217,37 @@ bool same(float x, float y) {
     return std::bit_cast<uint32_t>(x) == std::bit_cast<uint32_t>(y) || (std::isnan(x) && std::isnan(y));
 }
 
+// Blocks placed at once: the same bits on all targets, and within the slack of nodes placed one by one.
+void expect_blocks_to_be_placed(const Block& block, const LatticePose& pose) {
+    Single first[kBlockLanes];
+    bool known = false;
+    targets::for_each([&](const char* target) {
+        Single here[kBlockLanes];
+        HWY_DYNAMIC_DISPATCH(place_blocks)(block.bytes.data(), pose, here);
+        for (uint32_t lane = 0; lane < kBlockLanes; ++lane) {
+            const Single &s = here[lane], &f = known ? first[lane] : s;
+            const Single alone = place(block.bytes.data(), lane, pose);
+            for (size_t i = 0; i < 3; ++i) {
+                ASSERT_TRUE(same(s.center[i], f.center[i]) && same(s.diagonal[i], f.diagonal[i]) &&
+                            same(s.off_diagonal[i], f.off_diagonal[i]) && same(s.low[i], f.low[i]) &&
+                            same(s.high[i], f.high[i]))
+                    << target;
+                for (size_t c = 0; c < 3; ++c) {
+                    ASSERT_TRUE(same(s.factor[c][i], f.factor[c][i])) << target;
+                    ASSERT_NEAR(s.factor[c][i], alone.factor[c][i], kLaneMargin * s.size);
+                }
+                ASSERT_NEAR(s.center[i], alone.center[i], s.slack / 2);
+                ASSERT_LE(s.low[i], s.center[i] - std::sqrt(s.diagonal[i]));
+                ASSERT_GE(s.high[i], s.center[i] + std::sqrt(s.diagonal[i]));
+            }
+            ASSERT_TRUE(same(s.size, f.size) && same(s.weight, f.weight) && same(s.slack, f.slack)) << target;
+            ASSERT_GT(s.slack, alone.slack);
+        }
+        std::copy_n(here, kBlockLanes, first);
+        known = true;
+    });
+}
+
 TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarReference) {
     Random random(7);
     for (uint32_t n = 0; n < 4000; ++n) {
@@ -216,7 +260,9 @@ TEST(Lanes, AllTargetsGiveTheBitsOfTheScalarReference) {
         }
         Pose pose;
         pose.rotation = random.rotation(), pose.translation = scenes::to_float(random.in_ball());
-        const Single single = place(b.bytes.data(), 3, lattice_pose(relative_pose({}, pose), b.lattice, a.lattice));
+        const LatticePose lattice = lattice_pose(relative_pose({}, pose), b.lattice, a.lattice);
+        const Single single = place(b.bytes.data(), 3, lattice);
+        expect_blocks_to_be_placed(b, lattice);
         targets::for_each([&](const char* target) {
             LaneGap out[kBlockLanes];
             const uint32_t bits = HWY_DYNAMIC_DISPATCH(lane_gaps)(a.bytes.data(), a.lattice.step_exponent, single, out);
