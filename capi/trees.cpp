@@ -184,10 +184,10 @@ prolate_status prolate_make_sphere(float radius, void* buffer, size_t capacity, 
     return hand_over(sphere_tree(radius), buffer, capacity, needed, tree, error);
 }
 
-prolate_status prolate_make_cylinder(float radius, float half_height, void* buffer, size_t capacity, size_t* needed,
-                                     prolate_tree* tree, prolate_error* error) {
+prolate_status prolate_make_cylinder(float radius, float half_height, uint32_t sides, void* buffer, size_t capacity,
+                                     size_t* needed, prolate_tree* tree, prolate_error* error) {
     if ((buffer == nullptr && capacity > 0) || tree == nullptr) return failed(PROLATE_BAD_ARGUMENT, error);
-    return hand_over(cylinder_tree(radius, half_height), buffer, capacity, needed, tree, error);
+    return hand_over(cylinder_tree(radius, half_height, sides), buffer, capacity, needed, tree, error);
 }
 
 prolate_status prolate_make_capsule(prolate_vec3 a, prolate_vec3 b, float radius, void* buffer, size_t capacity,

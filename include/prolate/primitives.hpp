@@ -19,9 +19,14 @@ namespace prolate {
 /// if a half extent is not finite and above 0, or out of the format's range (src/FORMAT.md, "Known limits").
 Result<Tree> box_tree(const Vec3& half);
 
-/// A prism around the cylinder x^2 + y^2 <= radius^2, |z| <= half_height, metres. It holds the cylinder, and sticks out
-/// of it by at most 5.3 / sides^2 of the radius: 0.5 % with 32 sides, 0.03 % with 128, in 4 triangles a side. `sides`
-/// are a power of two, 8 ... 1024. Fails as box_tree() does.
+/// A prism that stands for the cylinder x^2 + y^2 <= radius^2, |z| <= half_height, metres: it holds it, and sticks out
+/// of it by at most e = 5.3 / sides^2 of the radius, rounding included: 0.5 % with 32 sides, 0.03 % with 128, 5e-6 with
+/// 1024, in 4 triangles a side. `sides` are a power of two, 8 ... 1024. Fails as box_tree() does.
+///
+/// So of the round cylinder, *separated* is certain, and lower bounds of distances and times of contact hold; upper
+/// bounds of distances may be too small by e, and depths too large by as much. Where it lies on a plane, depth deep,
+/// its points are at most sqrt(2 radius (e + depth)) + e off the line that the cylinder touches with. (A leaf of its
+/// own for cylinders would need a case in every query.)
 Result<Tree> cylinder_tree(float radius, float half_height, uint32_t sides = 32);
 
 /// The convex polyhedron with these triangles, exactly: indices into `points`, counter-clockwise seen from outside.

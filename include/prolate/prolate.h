@@ -144,14 +144,15 @@ PROLATE_API prolate_status prolate_tree_coarser(const prolate_tree* tree, uint32
 PROLATE_API prolate_status prolate_tree_inner(const prolate_tree* tree, prolate_tree* inner);
 
 /** primitives.hpp. Their bytes go into `buffer` as with prolate_tree_load(); prolate_primitive_size() is enough but for
- * large polyhedra. `triangles`: three indices each. */
+ * large polyhedra and cylinders of more than 64 sides. `triangles`: three indices each. */
 PROLATE_API size_t prolate_primitive_size(void);
 PROLATE_API prolate_status prolate_make_box(prolate_vec3 half, void* buffer, size_t capacity, size_t* needed,
                                             prolate_tree* tree, prolate_error* error);
 PROLATE_API prolate_status prolate_make_sphere(float radius, void* buffer, size_t capacity, size_t* needed,
                                                prolate_tree* tree, prolate_error* error);
-PROLATE_API prolate_status prolate_make_cylinder(float radius, float half_height, void* buffer, size_t capacity,
-                                                 size_t* needed, prolate_tree* tree, prolate_error* error);
+PROLATE_API prolate_status prolate_make_cylinder(float radius, float half_height, uint32_t sides, void* buffer,
+                                                 size_t capacity, size_t* needed, prolate_tree* tree,
+                                                 prolate_error* error);
 /** capsule_tree(): `tree` is rounded by the radius, which `buffer` does not hold. */
 PROLATE_API prolate_status prolate_make_capsule(prolate_vec3 a, prolate_vec3 b, float radius, void* buffer,
                                                 size_t capacity, size_t* needed, prolate_tree* tree,

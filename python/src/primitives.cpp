@@ -3,6 +3,8 @@
 
 #include <prolate/primitives.hpp>
 
+#include <bit>
+
 namespace prolate::python {
 namespace {
 
@@ -65,11 +67,13 @@ void bind_primitives(nb::module_& m) {
         nb::arg("half").none());
     m.def(
         "cylinder_tree",
-        [](nb::handle radius, nb::handle half_height) {
-            return bytes_of(cylinder_tree(above_0(radius, "radius"), above_0(half_height, "half_height")),
+        [](nb::handle radius, nb::handle half_height, nb::handle sides) {
+            const auto count = static_cast<uint32_t>(whole(sides, "sides", 8, 1024));
+            if (!std::has_single_bit(count)) value_error("sides", "must be a power of two");
+            return bytes_of(cylinder_tree(above_0(radius, "radius"), above_0(half_height, "half_height"), count),
                             "radius, half_height");
         },
-        nb::arg("radius").none(), nb::arg("half_height").none());
+        nb::arg("radius").none(), nb::arg("half_height").none(), nb::arg("sides").none());
     m.def("convex_tree", &convex, nb::arg("points").none(), nb::arg("faces").none());
     m.def(
         "ellipsoid_tree",

@@ -286,6 +286,8 @@ def test_primitives_are_what_they_are_called(box_a, box_b):
     found = prolate.contains(prolate.cylinder_tree(0.5, 0.7), points)
     assert (found[in_cylinder] == Verdict.OVERLAPPING).all()
     assert (found[(round_ > 0.5025) | (np.abs(points[:, 2]) > 0.7001)] == Verdict.SEPARATED).all()
+    fine = prolate.contains(prolate.cylinder_tree(0.5, 0.7, sides=1024), points)
+    assert (fine[round_ > 0.50001] == Verdict.SEPARATED).all() and (fine[in_cylinder] == Verdict.OVERLAPPING).all()
     for tree, radii in (
         (prolate.ellipsoid_tree([0.9, 0.5, 0.2]), [0.9, 0.5, 0.2]),
         (prolate.sphere_tree(0.6), [0.6] * 3),
@@ -301,6 +303,9 @@ def test_primitives_are_what_they_are_called(box_a, box_b):
         prolate.box_tree([1, 0, 1])
     with pytest.raises(ValueError, match="radius"):
         prolate.sphere_tree(-1)
+    for sides in (0, 33, 2048):
+        with pytest.raises(ValueError, match="sides"):
+            prolate.cylinder_tree(1, 1, sides)
     with pytest.raises(ValueError, match="faces"):
         prolate.convex_tree(corners, faces + 1)
     with pytest.raises(prolate.Error, match="faces"):

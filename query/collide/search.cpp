@@ -285,6 +285,7 @@ private:
             if (test(0, in_a.first, in_a.count, in_b.first + lane, placed[lane], (leaves >> lane & 1) * kOtherIsLeaf,
                      nodes))
                 return stopped();
+            if (size_ == 0) continue;
             if (const Verdict verdict = descend(); verdict != Verdict::separated) return verdict;
         }
         return Verdict::separated;

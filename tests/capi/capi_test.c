@@ -36,7 +36,7 @@ static void test_trees(void) {
     CHECK(needed > 0 && needed <= prolate_primitive_size());
     CHECK_OK(prolate_make_sphere(1, ball_bytes, sizeof ball_bytes, NULL, &ball, NULL));
     prolate_tree other;
-    CHECK_OK(prolate_make_cylinder(1, 2, other_bytes, sizeof other_bytes, &needed, &other, NULL));
+    CHECK_OK(prolate_make_cylinder(1, 2, 32, other_bytes, sizeof other_bytes, &needed, &other, NULL));
     CHECK(needed <= prolate_primitive_size());
 
     prolate_tree_info info = PROLATE_INIT(prolate_tree_info);

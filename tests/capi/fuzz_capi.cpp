@@ -253,6 +253,6 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     prolate_tree other;
     (void)prolate_make_box(half, box.data(), box.size(), nullptr, &other, nullptr);
     (void)prolate_make_sphere(half.x, box.data(), box.size(), nullptr, &other, nullptr);
-    (void)prolate_make_cylinder(half.x, half.y, box.data(), box.size(), nullptr, &other, nullptr);
+    (void)prolate_make_cylinder(half.x, half.y, 32, box.data(), box.size(), nullptr, &other, nullptr);
     return 0;
 }

@@ -6,6 +6,7 @@
 #include <prolate/collide.hpp>
 #include <prolate/contacts.hpp>
 #include <prolate/distance.hpp>
+#include <prolate/half_space.hpp>
 #include <prolate/points.hpp>
 #include <prolate/primitives.hpp>
 #include <prolate/shapes.hpp>
@@ -163,6 +164,187 @@ TEST(Primitives, ACylinderIsHeldAndLittleMore) {
         }
     }
     for (const uint32_t sides : {0u, 4u, 33u, 2048u}) EXPECT_EQ(cylinder_tree(1, 1, sides).error().where, sides);
+}
+
+// ---- prisms beside the cylinders that they stand for ----
+
+// The cylinder itself, in double precision, and what its prism of so many sides may stick out.
+struct RoundCylinder {
+    double radius, half_height, more;
+
+    double distance(const Point& p) const { // in its own frame, 0 within
+        const double out = std::max(std::hypot(p[0], p[1]) - radius, 0.0);
+        return std::hypot(out, std::max(std::abs(p[2]) - half_height, 0.0));
+    }
+    // From the segment of these ends: the distance is convex along it.
+    double distance(const Point& a, const Point& b) const {
+        const auto at = [&](double t) {
+            return distance(Point{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2])});
+        };
+        double low = 0, high = 1;
+        for (int i = 0; i < 200; ++i) {
+            const double third = (high - low) / 3;
+            (at(low + third) < at(high - third) ? high : low) += at(low + third) < at(high - third) ? -third : third;
+        }
+        return at((low + high) / 2);
+    }
+    // How far it reaches against a direction, from its center.
+    double depth(const Point& n) const { return radius * std::hypot(n[0], n[1]) + half_height * std::abs(n[2]); }
+};
+Point in_frame(const Pose& pose, const Vec3& p) {
+    const reference::Vector x{reference::Real{p.x} - pose.translation.x, reference::Real{p.y} - pose.translation.y,
+                              reference::Real{p.z} - pose.translation.z};
+    const reference::Vector r = reference::operator*(reference::transposed(reference::rotation(pose.rotation)), x);
+    return {static_cast<double>(r[0]), static_cast<double>(r[1]), static_cast<double>(r[2])};
+}
+Point turned(const Pose& pose, const Vec3& n) {
+    return in_frame({{}, pose.rotation}, n);
+}
+
+struct Cylinders {
+    std::vector<RoundCylinder> round;
+    std::vector<Tree> prisms;
+    Cylinders() {
+        for (const uint32_t sides : {8u, 32u, 128u, 1024u})
+            for (const float half : {0.05f, 0.7f, 3.0f}) {
+                round.push_back({0.5, double{half}, 5.3 / sides / sides * 0.5});
+                prisms.push_back(must(cylinder_tree(0.5f, half, sides)));
+            }
+    }
+};
+constexpr double kRounding = 2e-6; // of poses, balls and points, which are floats
+
+// Nearer than the cylinder by no more than the prism sticks out, and never farther.
+void expect_of_distance(const DistanceResult& got, double gap, double more) { // below 0: they meet
+    if (got.verdict == Verdict::separated) {
+        EXPECT_GT(gap, -kRounding);
+    }
+    const double truth = std::max(gap, 0.0);
+    EXPECT_LE(got.lower, truth + kRounding);
+    EXPECT_GE(got.lower, (truth - more) * (1 - 2e-6) - kRounding);
+    EXPECT_LE(got.upper, truth * (1 + 2e-6) + kRounding);
+    if (truth > more + kRounding) {
+        EXPECT_EQ(got.verdict, Verdict::separated);
+    }
+}
+
+TEST(Primitives, DistancesOfCylindersAreThoseOfRoundOnes) {
+    const Cylinders cylinders;
+    Random random(11);
+    const auto context = std::make_unique<QueryContext>();
+    int apart = 0, meet = 0;
+    for (size_t i = 0; i < 3000; ++i) {
+        const size_t k = i % cylinders.round.size();
+        const RoundCylinder& truth = cylinders.round[k];
+        const TreeView prism = cylinders.prisms[k].view();
+        const Pose pose = near(random, 1);
+        const auto far = [&] { return scenes::to_float(random.in_ball()); };
+        // A capsule, every other time a ball: shrunk to within a little of the cylinder, for there it matters.
+        const Vec3 a = far(), b = i % 2 == 0 ? a : far();
+        const double room = truth.distance(in_frame(pose, a), in_frame(pose, b));
+        const auto radius = static_cast<float>(std::max(room + random.in(-1, 1) * random.log_in(1e-5, 0.5), 1e-3));
+        const Tree capsule = must(capsule_tree(a, b, radius));
+        const DistanceResult got = distance(prism, pose, capsule.view(), {}, *context, {.tolerance_relative = 1e-6});
+        expect_of_distance(got, room - double{radius}, truth.more);
+        const Verdict verdict = collide(prism, pose, capsule.view(), {}, *context).verdict;
+        EXPECT_EQ(verdict, got.verdict);
+        ++(verdict == Verdict::separated ? apart : meet);
+    }
+    EXPECT_GT(apart, 500);
+    EXPECT_GT(meet, 500);
+}
+
+TEST(Primitives, CylindersOnTheGroundAreRound) {
+    const Cylinders cylinders;
+    Random random(12);
+    const auto context = std::make_unique<QueryContext>();
+    int touching = 0, lying = 0;
+    for (size_t i = 0; i < 6000; ++i) {
+        const size_t k = i % cylinders.round.size();
+        const RoundCylinder& truth = cylinders.round[k];
+        const TreeView prism = cylinders.prisms[k].view();
+        Pose pose = near(random, 1);
+        if (i % 3 == 0) { // it lies there, rolled by any angle
+            const auto angle = static_cast<float>(random.in(-3, 3));
+            pose.rotation = {std::cos(angle), std::sin(angle), std::sin(angle), std::cos(angle)}; // x to z, about z
+        }
+        const Vec3 up = i % 3 == 0 ? Vec3{0, 0, 1} : scenes::to_float(random.direction());
+        const Point n = turned(pose, up), c = {pose.translation.x, pose.translation.y, pose.translation.z};
+        const double center = up.x * c[0] + up.y * c[1] + up.z * c[2];
+        const double gap = random.in(-1, 1) * random.log_in(1e-6, 0.2), length = std::hypot(n[0], n[1], n[2]);
+        const HalfSpace ground{up, static_cast<float>((center - truth.depth(n) - gap) / length)};
+        const double apart = center / length - truth.depth(n) / length - double{ground.offset};
+        const DistanceResult got = distance(prism, pose, ground, *context);
+        expect_of_distance(got, apart, truth.more);
+        const float margin = i % 2 == 0 ? 0 : 0.01f;
+        ContactManifolds manifolds;
+        const ContactResult contact = contacts(prism, pose, ground, manifolds, *context, {.margin = margin});
+        if (apart < double{margin} - kRounding) {
+            EXPECT_EQ(contact.verdict, Verdict::overlapping);
+        }
+        if (apart > double{margin} + truth.more + kRounding) {
+            EXPECT_EQ(contact.verdict, Verdict::separated);
+        }
+        if (manifolds.count == 0) continue;
+        const Manifold& m = manifolds.manifolds[0];
+        double deepest = -1;
+        for (uint32_t p = 0; p < m.count; ++p) deepest = std::max(deepest, double{m.points[p].depth});
+        const double slack = 0.01 * std::abs(apart) + 1e-4 * (truth.radius + truth.half_height) + kRounding;
+        EXPECT_GE(deepest, -apart - slack);
+        EXPECT_LE(deepest, -apart + truth.more + kRounding);
+        ++touching;
+        if (i % 3 != 0 || margin > 0 || apart > 0) continue;
+        // Of what rolls: points at both ends, near the line that the cylinder would touch with.
+        double least = HUGE_VAL, most = -HUGE_VAL;
+        for (uint32_t p = 0; p < m.count; ++p) {
+            const Point at = in_frame(pose, m.points[p].point_a);
+            least = std::min(least, at[2]), most = std::max(most, at[2]);
+            const double under = truth.more - apart + kRounding; // how far it may reach into the ground
+            const double chord = std::sqrt(2 * (truth.radius + truth.more) * under) + under;
+            EXPECT_LE(std::hypot(at[0] - -truth.radius * n[0] / length, at[1] - -truth.radius * n[1] / length), chord);
+        }
+        EXPECT_NEAR(least, -truth.half_height, kRounding);
+        EXPECT_NEAR(most, truth.half_height, kRounding);
+        ++lying;
+    }
+    EXPECT_GT(touching, 2000);
+    EXPECT_GT(lying, 300);
+}
+
+// It falls on the ground, and on a ball: not later than the cylinder would, and earlier by no more than it sticks out.
+TEST(Primitives, CylindersMeetWhenRoundOnesDo) {
+    const Cylinders cylinders;
+    Random random(13);
+    const auto context = std::make_unique<QueryContext>();
+    for (size_t i = 0; i < 600; ++i) {
+        const size_t k = i % cylinders.round.size();
+        const RoundCylinder& truth = cylinders.round[k];
+        const TreeView prism = cylinders.prisms[k].view();
+        Pose pose = near(random, 0);
+        pose.translation = {0, 0, 5};
+        const Motion falling{pose, {0, 0, -8}, {}, {}};
+        const double tolerance = 1e-5, slack = (tolerance + kRounding) / 8;
+        const double on_ground = (5 - truth.depth(turned(pose, {0, 0, 1}))) / 8;
+        const SweepResult ground = sweep(prism, falling, HalfSpace{{0, 0, 1}, 0}, *context, {.tolerance = tolerance});
+        ASSERT_EQ(ground.verdict, Verdict::overlapping);
+        EXPECT_LE(ground.time_lower, on_ground + slack);
+        EXPECT_GE(ground.time_lower, on_ground - truth.more / 8 - slack);
+
+        // Straight above the ball: the time of a round cylinder by bisection, for it falls on what is convex.
+        const Tree ball = must(capsule_tree({0, 0, 0}, {0, 0, 0}, 0.4f));
+        const auto meets = [&](double t) {
+            Pose now = pose;
+            now.translation.z = static_cast<float>(5 - 8 * t);
+            return truth.distance(in_frame(now, {0, 0, 0})) <= 0.4;
+        };
+        double low = 0, high = 5.0 / 8;
+        for (int step = 0; step < 40; ++step) (meets((low + high) / 2) ? high : low) = (low + high) / 2;
+        const Motion still{{}, {}, {}, {}};
+        const SweepResult got = sweep(ball.view(), still, prism, falling, *context, {.tolerance = tolerance});
+        ASSERT_EQ(got.verdict, Verdict::overlapping);
+        EXPECT_LE(got.time_lower, high + slack);
+        EXPECT_GT(got.time_lower, 0);
+    }
 }
 
 TEST(Primitives, AnEllipsoidIsHeldAndLittleMore) {
