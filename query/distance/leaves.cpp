@@ -57,7 +57,7 @@ void DistanceSearch::take(const TriangleDistance& found, const MeetingPair& pair
     const double length = glm::length(between);
     normal = length > 0 ? between / length : dvec3(0);
     normal_b = normal * b_to_a.rotation;
-    supports_a_ = supports_b_ = {};
+    if (length > 0) ++normals_found;
 }
 
 bool DistanceSearch::decide(uint32_t node_a, uint32_t node_b, double bound) noexcept {
@@ -93,30 +93,9 @@ void DistanceSearch::decide_ellipsoids(uint32_t node_a, uint32_t node_b, double 
     take({std::max(0.0, gap.lower), std::max(0.0, gap.upper), gap.point_a, gap.point_b}, {node_a, node_b}, bound, meet);
 }
 
-// A lower bound from `normal`.
-double DistanceSearch::gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a,
-                                        TriangleRange in_b) noexcept {
-    const auto kept = [](Supports& supports, const TreeView& tree, uint32_t leaf, TriangleRange range, const dvec3& n) {
-        Support& at = supports[leaf % supports.size()];
-        if (at.leaf != leaf) at = {leaf, triangle_support(tree, range, n)};
-        return at.reach;
-    };
-    const double gap = (glm::dot(normal, b_to_a.translation) - kept(supports_b_, b.tree, node_b, in_b, -normal_b)) -
-                       kept(supports_a_, a.tree, node_a, in_a, normal);
-    return (gap - kSeparationMargin * triangle_reach_) * (1 - 0x1p-50);
-}
-
 void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,
                                       double bound) noexcept {
     const double limit = enough();
-    if (normal !=
-        dvec3(0)) { // almost all leaves are far enough from each other along the direction of the nearest ones
-        const double gap = gap_along_normal(node_a, node_b, in_a, in_b);
-        if (gap >= limit) {
-            skipped = std::min(skipped, std::max(gap, bound));
-            return;
-        }
-    }
     const LeafDistance found = distance_of_leaves(
         a.tree, in_a, b.tree, in_b, b_to_a, {limit, options.tolerance_absolute, options.tolerance_relative}, normal);
     stats.triangle_tests += found.pair_tests;

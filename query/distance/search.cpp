@@ -8,6 +8,9 @@
 // least bound is as good as the nearest leaves found. First of all one descent to the nearest child each time finds
 // two leaves, and an upper bound.
 //
+// Once there is a nearest pair, others are also looked at along its normal (reach-inl.hpp): they may be far enough from
+// each other along it. That takes no part in the budget, of which it is a fraction.
+//
 // The bounds of a pair do not depend on what the search has found so far, and children inherit them. So whatever limit
 // ends the search, a higher limit gives bounds as tight or tighter.
 //
@@ -16,13 +19,14 @@
 // Memory: the pairs in the heap fill the caller's scratch at most. When it is full, pairs are searched depth first,
 // which takes some more tests, until there is room.
 //
-// Complexity: pairs of nodes whose bound is below the distance; for two fine meshes, 100 to 250 block tests.
+// Complexity: pairs of nodes whose bound is below the distance; for two fine meshes, 30 to 70 block tests.
 #include "query/simd/targets.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/distance/search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/distance/reach-inl.hpp"
 #include "query/distance/search.hpp"
 #include "query/inside/enclosure.hpp"
 #include "query/node/best_first.hpp"
@@ -70,6 +74,10 @@ struct ByBoundAndCenters {
     static uint32_t flags(float between) { return std::bit_cast<uint32_t>(between) & ~kFlags; }
 };
 
+// A pair of inner nodes is looked at along the normal of the nearest pair if its bound is this share of enough: then
+// the normal is about its own direction.
+constexpr double kNearlyEnough = 0.8;
+
 // Scratch::Entry::bound is the pair's, less that of the roots. kFlat: the roots end with faces that are parallel.
 template <bool kFlat> class DistanceTraversal {
     using Entry = Scratch::Entry;
@@ -78,7 +86,7 @@ public:
     DistanceTraversal(DistanceSearch& search, double by_slabs) // a bound on the distance of the roots
         : s_(search),
           heap_(search.entries), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}},
-          by_slabs_(by_slabs), room_(search.room) {}
+          reaches_{Reaches(search.a), Reaches(search.b)}, by_slabs_(by_slabs), room_(search.room) {}
 
     void run() {
         search();
@@ -101,7 +109,9 @@ private:
         }
         if (!near) return done(true);
         for (bool descending = true;;) {
-            if (are_leaves(e.flags)) {
+            if (beyond_normal(e)) {
+                descending = false;
+            } else if (are_leaves(e.flags)) {
                 if (!s_.decide(e.node_a, e.node_b, bound_of(e))) return stop_at(e);
                 if (s_.overlapping) return;
                 descending = false;
@@ -139,6 +149,47 @@ private:
         if (!(bound >= s_.enough())) return false;
         s_.skipped = std::min(s_.skipped, bound);
         return true;
+    }
+    // Are two nodes far enough from each other along the normal of the nearest pair (reach-inl.hpp)?
+    HWY_INLINE bool beyond_normal(uint32_t node_a, uint32_t node_b, double bound) {
+        return follow_normal() && leave_enough(reaches_[0].of(node_a), reaches_[1].of(node_b), bound);
+    }
+    // The same of a pair that comes up. Inner nodes take a closer look if that may settle it; not where a level ends
+    // the search, for the reason given at no_limit_.
+    HWY_INLINE bool beyond_normal(const Entry& e) {
+        const double bound = bound_of(e);
+        if (are_leaves(e.flags)) return beyond_normal(e.node_a, e.node_b, bound);
+        if (!no_limit_ || bound < kNearlyEnough * s_.enough() || !follow_normal()) return false;
+        const Reach &a = reaches_[0].of(e.node_a), &b = reaches_[1].of(e.node_b);
+        if (leave_enough(a, b, bound)) return true;
+        const double room = (along_ - s_.enough()) - 2 * kSeparationMargin * s_.reach_of_triangles(); // for both
+        if (a.most + b.most - (a.spare + b.spare) > room) return false;
+        return closer_look(e, room, a, b);
+    }
+    HWY_NOINLINE bool closer_look(const Entry& e, double room, Reach a, Reach b) {
+        Entry* const stack = s_.entries + heap_.size();
+        if (a.spare > 0) {
+            a = reaches_[0].closer(e.node_a, room - b.most, room - (b.most - b.spare), stack);
+            if (leave_enough(a, b, bound_of(e))) return true;
+            if (a.most + b.most - b.spare > room) return false;
+        }
+        if (b.spare > 0) b = reaches_[1].closer(e.node_b, room - a.most, room - a.most, stack);
+        return leave_enough(a, b, bound_of(e));
+    }
+    HWY_INLINE bool leave_enough(const Reach& a, const Reach& b, double bound) {
+        const double gap = ((along_ - b.most) - a.most) - kSeparationMargin * s_.reach_of_triangles();
+        const double certain = gap * (1 - 0x1p-50);
+        return certain >= s_.enough() && skips(std::max(certain, bound));
+    }
+    // False if there is no normal yet. Ellipsoids reach so far beyond their neighbours that it does not pay.
+    HWY_INLINE bool follow_normal() {
+        if (!all_triangles_) return false;
+        if (turn_ != s_.normals_found) {
+            turn_ = s_.normals_found;
+            reaches_[0].turn(s_.normal), reaches_[1].turn(-s_.normal_b);
+            along_ = glm::dot(s_.normal, s_.b_to_a.translation);
+        }
+        return turn_ != 0;
     }
     // The search ends here: what is in the heap is open, or if `complete` only not better than what was skipped.
     void done(bool complete) {
@@ -221,6 +272,9 @@ private:
                     if (skips(lower)) continue;
                 }
             }
+            const uint32_t node = first + lane;
+            if (leaf && other_leaf != 0 && beyond_normal(open != 0 ? other : node, open != 0 ? node : other, lower))
+                continue;
             const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
             if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
             uint32_t flags = (open_this ? open : open ^ kOpenB) | (leaf ? this_leaf : 0) | other_leaf;
@@ -234,7 +288,6 @@ private:
             }
             if (nearest) nearest_ = count_, least_ = lower;
             const float bound = inherit(e.bound, lower);
-            const uint32_t node = first + lane;
             children_[count_++] = {open != 0 ? other : node, open != 0 ? node : other, bound, flags};
         }
     }
@@ -277,7 +330,7 @@ private:
         bool within = true;
         while (size > 0 && !s_.overlapping) {
             const Entry e = stack[--size];
-            if (skips(bound_of(e))) continue;
+            if (skips(bound_of(e)) || beyond_normal(e.node_a, e.node_b, bound_of(e))) continue;
             const bool leaves = are_leaves(e.flags);
             if (leaves || !too_deep(e))
                 within = within && (leaves ? s_.decide(e.node_a, e.node_b, bound_of(e)) : open(e));
@@ -293,10 +346,14 @@ private:
     PairHeap<std::conditional_t<kFlat, ByBoundAndCenters, ByBound>> heap_;
     DistanceSide sides_[2];
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
-    // Not where a level ends the search: bounds of a pair must not depend on when it comes up, or a deeper search might
+    // Where a level ends the search, the bounds of a pair must not depend on when it comes up, or a deeper search might
     // find less.
-    const bool have_slabs_ =
-        (s_.a.has_slabs || s_.b.has_slabs) && s_.a.limit_from == UINT32_MAX && s_.b.limit_from == UINT32_MAX;
+    const bool no_limit_ = s_.a.limit_from == UINT32_MAX && s_.b.limit_from == UINT32_MAX;
+    const bool have_slabs_ = (s_.a.has_slabs || s_.b.has_slabs) && no_limit_;
+    const bool all_triangles_ = s_.a.tree.has_triangles() && s_.b.tree.has_triangles();
+    Reaches reaches_[2];
+    uint32_t turn_ = 0;     // which normal they are along,
+    double along_ = 0;      // and how far the way from A's origin to B's is
     const double by_slabs_; // a bound of the roots
     double base_ = 0;       // bound of the roots, metres
     uint32_t room_;         // of the heap: what depth_first() needs is kept free

@@ -15,7 +15,6 @@
 #include <glm/vec3.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <limits>
 
@@ -44,6 +43,7 @@ struct DistanceSearch {
     glm::dvec3 on_a{0, 0, 0}, on_b{0, 0, 0};
     glm::dvec3 normal{0, 0, 0};   ///< unit, from on_a to on_b; 0 if they coincide or are not known
     glm::dvec3 normal_b{0, 0, 0}; ///< the same as B's frame has it
+    uint32_t normals_found = 0;   ///< of which this is the last
 
     DistanceSearch(const OrderedBodies<Pose>& bodies, Scratch context,
                    const DistanceOptions& distance_options) noexcept;
@@ -77,16 +77,8 @@ struct DistanceSearch {
     static constexpr double kLeastTolerance = 1e-12, kMostTolerance = 1;
 
 private:
-    // Supports of leaves along `normal`, or of B's against it: few leaves are asked for often.
-    struct Support {
-        uint32_t leaf = UINT32_MAX;
-        double reach;
-    };
-    using Supports = std::array<Support, 16>;
-    Supports supports_a_, supports_b_;
     double triangle_reach_; // S of query/triangle/support.hpp
 
-    double gap_along_normal(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b) noexcept;
     void take(const TriangleDistance& found, const MeetingPair& pair, double bound, bool meet) noexcept;
     void decide_ellipsoids(uint32_t node_a, uint32_t node_b, double bound) noexcept;
     void decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,

@@ -237,6 +237,37 @@ TEST(Agreement, OfOneOfEach) {
     expect_agreement(covers(), solids(), 60);
 }
 
+// Bodies that a plane keeps apart: there, most pairs are passed over along one direction, the nearest pair's.
+TEST(Agreement, OfDistancesFarApart) {
+    Random random(5);
+    const auto dented = [&](Mesh mesh) {
+        for (Vec3& v : mesh.vertices) {
+            const auto scale = static_cast<float>(random.in(0.97, 1));
+            v = {scale * v.x, scale * v.y, scale * v.z};
+        }
+        return scenes::exact_tree(mesh).bytes;
+    };
+    const Body bodies[] = {{dented(shapes::icosphere(3))}, {dented(shapes::torus(0.8f, 0.25f, 40, 20))}, covers()[0]};
+    const auto context = std::make_unique<QueryContext>();
+    for (const Body& body_a : bodies)
+        for (const Body& body_b : bodies)
+            for (int i = 0; i < 12; ++i) {
+                const TreeView a = body_a.view(), b = body_b.view();
+                const Query q{scenes::pose_at(random, 0), scenes::pose_at(random, random.in(1.5, 6))};
+                const Truth truth(a, b, q);
+                const DistanceResult d = distance(a, q.a, b, q.b, *context);
+                if (truth.meet || d.enclosed) continue;
+                EXPECT_EQ(d.verdict, Verdict::separated);
+                EXPECT_LE(d.lower, truth.upper);
+                EXPECT_GE(d.upper, truth.lower * (1 - 1e-15));
+                EXPECT_LE(d.upper - d.lower, std::max(1e-6 * d.upper, 4e-9 * truth.reach));
+                DistanceCache cache{.valid = true, .pair = d.pair}; // a direction from the beginning
+                const DistanceResult again = distance(a, q.a, b, q.b, *context, {}, &cache);
+                EXPECT_LE(again.lower, truth.upper);
+                EXPECT_GE(again.upper, truth.lower * (1 - 1e-15));
+            }
+}
+
 // A prefix of a tree is one of its own: its leaves are its last level.
 TEST(Agreement, OfPrefixes) {
     std::vector<Body> cut;
