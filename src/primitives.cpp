@@ -252,8 +252,13 @@ Result<Tree> cylinder_tree(float radius, float half_height, uint32_t sides) {
     for (uint32_t i = 0; i < sides; ++i) {
         const uint32_t next = (i + 1) % sides;
         triangles.insert(triangles.end(), {{i, next, sides + next}, {i, sides + next, sides + i}});
-        if (i > 0 && next > 0) triangles.insert(triangles.end(), {{0, next, i}, {sides, sides + i, sides + next}});
     }
+    // The ends, from the rim inwards: each round cuts off every second corner, so that most triangles are small.
+    for (uint32_t step = 1; 2 * step < sides; step *= 2)
+        for (uint32_t i = 0; i < sides; i += 2 * step) {
+            const uint32_t middle = i + step, next = (i + 2 * step) % sides;
+            triangles.insert(triangles.end(), {{i, next, middle}, {sides + i, sides + middle, sides + next}});
+        }
     return tree_of(std::move(vertices), std::move(triangles));
 }
 

@@ -36,6 +36,7 @@ PlacedHalfSpace moved(PlacedHalfSpace h, double margin) {
 
 constexpr double kSamePoint = 1e-4;  // of the body: what is nearer is one point
 constexpr uint32_t kFewCorners = 64; // all of which cost less than the blocks of nodes above them
+constexpr int kFewTouch = 8;         // of more, the search finds the outermost sooner, from those of the last query
 // Shares of the extent that is known: what lies farther out by less is not looked for, at first and if something new
 // was found.
 constexpr double kCoarseShare = 0x1p-4, kFineShare = 0x1p-6;
@@ -176,7 +177,7 @@ public:
 };
 
 // All that touches of a mesh of few corners: if there are four or fewer, they are the manifold. False, and nothing is
-// done, if the body is none, the budget does not suffice, or rounding leaves open which corners touch.
+// done, if the body is none, many touch, the budget does not suffice, or rounding leaves open which corners do.
 bool touch_few(const Ground& ground, const QueryOptions& options, Footprint& out, ContactResult& result) {
     const TreeView& tree = ground.tree;
     const uint32_t corners = tree.vertex_count(), triangles = tree.triangle_count();
@@ -196,6 +197,7 @@ bool touch_few(const Ground& ground, const QueryOptions& options, Footprint& out
             touch |= uint64_t{1} << v;
     }
     if (lowest <= kSeparationMargin * (2 * std::sqrt(reach) + ground.touched.reach)) return false;
+    if (std::popcount(touch) > kFewTouch) return false;
     for (uint32_t t = 0; t < triangles && (touch & ~used) != 0; ++t)
         for (const uint32_t v : tree.triangle(t)) used |= uint64_t{1} << v;
     touch &= used;
