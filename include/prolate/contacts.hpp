@@ -90,9 +90,9 @@ struct ContactResult {
 /// margin allow, moved onto the round surfaces along the normals: exact where cores do not meet, but for what the mean
 /// of a manifold's normals does to points that are not its deepest.
 ///
-/// Pairs are gone through twice, first to find the normals, then to collect the points; of 64 and more, the search
-/// runs twice. The answer's counters, and options.max_pair_tests, count one run. query/contacts/contacts.cpp has the
-/// details, query/triangle/contact.hpp the normals.
+/// Of closed bodies one way out of all pairs is sought first (query/contacts/one_way.hpp): one manifold, whose deepest
+/// point has its length for a depth, though facets may be nearer there. Without one, pairs are gone through as above;
+/// the search then runs two or three times, which counters and options.max_pair_tests count as one.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, Scratch context, const QueryOptions& options = {}) noexcept;
 

@@ -1,24 +1,27 @@
 // Contact manifolds: all pairs of leaves that meet, as collide_all() finds them, each turned into points with a normal
 // (pair_contacts.hpp), and all of these into a few manifolds (manifold.hpp).
 //
-// The pairs are gone through twice; the search runs again only if there are too many to be kept. The first time for the
-// normals: of each pair that along which its surroundings overlap least (query/triangle/contact.hpp), if that is less
-// than what a patch found before needs to resolve it, that is, to have it separated once the bodies are moved along the
-// patch's normal. Normals of faces make patches, others wait and count if no patch resolves them that is no deeper.
-// Then the deepest vertices of each patch are found, and patches all of which another one resolves are dropped. The
-// second time for the points: of each pair along the normal of the first patch that resolves it. (Compare Terdiman's
-// "voided features", which Bullet and Jolt have in variants.)
+// Mostly there is one way out, which is sought first (one_way.hpp). Bodies that have none or several, that are open, or
+// whose nodes stand for what is in them go through their pairs twice; the search runs again only if there are too many
+// to be kept. The first time for the normals: of each pair that along which its surroundings overlap least
+// (query/triangle/contact.hpp), if that is less than what a patch found before needs to resolve it, that is, to have it
+// separated once the bodies are moved along the patch's normal. Normals of faces make patches, others wait and count if
+// no patch resolves them that is no deeper. Then the deepest vertices of each patch are found, and patches all of which
+// another one resolves are dropped. The second time for the points: of each pair along the normal of the first patch
+// that resolves it. (Compare Terdiman's "voided features", which Bullet and Jolt have in variants.)
 //
 // Once there are more pairs than usual, both times leave out pairs of nodes that have the normal of a patch, which
 // resolves them, and reach no farther out than the patch's points (node_pair.hpp); the others are opened in the order
 // of how much farther they do. In the mean of the normals, what is left out weighs about as much.
 //
-// Complexity: twice collide_all()'s without what is left out, and some microseconds for each pair that meets; for each
-// patch up to 18 climbs and rays.
+// Complexity: that of collide_all() without what is left out, and of one way a tenth of a microsecond or two for each
+// pair that meets, some 30 climbs and two rays; otherwise twice collide_all()'s, some microseconds for each pair, and
+// for each patch up to 18 climbs and rays.
 #include "query/contacts/contacts.hpp"
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
 #include "query/contacts/node_pair.hpp"
+#include "query/contacts/one_way.hpp"
 #include "query/contacts/pair_contacts.hpp"
 #include "query/node/scratch.hpp"
 
@@ -54,11 +57,18 @@ class Collector {
 public:
     Collector(CollideSearch& search, const DividedScratch& scratch, bool exchanged, const LastContacts& last,
               uint64_t many)
-        : search_(search), exchanged_(exchanged), many_(many), last_(last), size_(smaller_size(search)),
-          pairs_(search, scratch, kSamePoint * size_), patches_(kSamePoint * size_),
+        : search_(search), many_(many), size_(smaller_size(search)),
+          bodies_(search.a.tree, search.b.tree, search.b_to_a, search.options.margin,
+                  {search.stats, search.other_tests, search.options.max_pair_tests}, scratch, kSamePoint * size_),
+          pairs_(search, bodies_), candidates_{last, exchanged}, one_way_(bodies_, candidates_, ways_[0], points_[0]),
+          patches_(kSamePoint * size_),
           of_ellipsoids_(!search.a.tree.has_triangles() && !search.b.tree.has_triangles()) {
+        if (!bodies_.closed_a || !bodies_.closed_b) phase_ = Phase::normals;
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
-        search.each = [](void* self, const MeetingPair& pair) { static_cast<Collector*>(self)->add(pair); };
+        search.each = [](void* self, const MeetingPair& pair) {
+            auto* const collector = static_cast<Collector*>(self);
+            collector->add(pair, collector->search_.found);
+        };
         search.each_user = this;
         if (search.a.limit_from != UINT32_MAX || search.b.limit_from != UINT32_MAX) return; // nodes stand for triangles
         search.sift = [](void* self, Scratch::Entry* begin, Scratch::Entry* end) {
@@ -67,36 +77,19 @@ public:
         search.sift_user = this;
     }
 
-    // Between the two passes: settles the normals and depths of the manifolds. Not inlined, so that its groups are not
-    // on the stack during the passes.
-    [[gnu::noinline]] void settle() {
-        flush();
-        reduce_ = search_.found >= many_ && !gives_up();
-        looked_at_ = resolved_ = 0;
-        Group groups[Patches::kMost];
-        const uint32_t count = group_patches(groups);
-        bool needed[Patches::kMost];
-        std::fill_n(needed, count, true);
-        for (uint32_t i = 0; i < count; ++i)
-            for (uint32_t j = 0; j < count && needed[i]; ++j)
-                if (j != i && needed[j]) needed[i] = !resolves_all(groups[j], groups[i]);
-        for (uint32_t i = 0; i < count && way_count_ < kManifolds; ++i)
-            if (needed[i]) ways_[way_count_] = groups[i].way, points_[way_count_] = groups[i].deepest, ++way_count_;
-        settled_ = true;
+    // After the search, which found these pairs first.
+    void finish(std::span<const MeetingPair> first) {
+        if (phase_ == Phase::seek && !begin_one_way(first)) again(Phase::normals, first);
+        if (phase_ == Phase::one_way) {
+            if (in_one_way(first)) return;
+            way_count_ = 0, points_[0] = {};
+            again(Phase::normals, first);
+        }
+        settle();
+        again(Phase::points, first);
     }
 
-    // The second pass, if the first one left out nothing and these are its pairs.
-    void repeat(std::span<const MeetingPair> pairs) {
-        for (size_t i = 0; i < pairs.size(); ++i)
-            if (of_ellipsoids_)
-                add_by_itself(waiting_.contacts[i]);
-            else if (pairs[i].triangle_a == kNoTriangle || pairs[i].triangle_b == kNoTriangle)
-                add_points(pairs[i]);
-            else if (!add_along_ways(pairs[i]))
-                add_own(pairs[i], own_[i]);
-    }
-
-    // After both: patches with points, at least one if any pair met.
+    // After that: patches with points, at least one if any pair met.
     uint32_t patches(const Patch* (&out)[kManifolds]) {
         uint32_t count = 0;
         for (uint32_t i = 0; i < way_count_; ++i)
@@ -112,11 +105,7 @@ public:
     double same_point() const { return patches_.same_point(); }
 
 private:
-    // A way to separate the bodies.
-    struct Way {
-        dvec3 normal;
-        double depth;
-    };
+    enum class Phase : uint8_t { seek, one_way, normals, points }; // what pairs are asked for
     // A patch of the first pass, its way, and the deepest points along that.
     struct Group {
         const Patch* patch;
@@ -127,27 +116,18 @@ private:
     // What two triangles have by themselves, if it is no longer than another patch's way: a normal of a face, or one
     // point that waits. If it is longer it is not known, but asked for once no way resolves the pair.
     struct Own {
-        dvec3 normal{0, 0, 0}; // 0: not known
-        bool certain = false;
+        bool known = false, certain = false;
         uint32_t waiting = 0;
+        dvec3 normal{0, 0, 0};
     };
 
     // ---- what need not be looked at ----
 
     // CollideSearch::sift.
     Scratch::Entry* sift(Scratch::Entry* begin, Scratch::Entry* end) {
-        if (!(settled_ ? reduce_ : search_.found >= many_ && !patches_.full()) || gives_up()) return end;
-        double gains[kBlockLanes];
-        uint32_t count = 0;
-        for (const Scratch::Entry* from = begin; from < end; ++from) {
-            Scratch::Entry e = *from;
-            const double gain = gain_of(e);
-            if (!(gain > 0)) continue;
-            uint32_t at = count++;
-            for (; at > 0 && gains[at - 1] > gain; --at) gains[at] = gains[at - 1], begin[at] = begin[at - 1];
-            gains[at] = gain, begin[at] = e;
-        }
-        return begin + count;
+        const bool sifts = phase_ == Phase::normals ? search_.found >= many_ && !patches_.full() : reduce_;
+        if (!sifts || gives_up()) return end;
+        return keep_gains(begin, end, [this](Scratch::Entry& e) { return gain_of(e); });
     }
     // Curved bodies have few such pairs, and looking for them would cost time in vain.
     bool gives_up() const { return looked_at_ >= kTries && resolved_ * kFewResolved < looked_at_; }
@@ -164,7 +144,7 @@ private:
         const auto gain = [&](const Patch& patch, const dvec3& n, double share) {
             return patch.empty() ? HUGE_VAL : patch.gain(pair.overlap(n), same_point(), share, extent);
         };
-        if (!settled_) {
+        if (phase_ == Phase::normals) {
             Patch& patch = patches_[resolving - 1];
             const dvec3 n = patch.normal();
             const double out = gain(patch, n, kFarther);
@@ -174,39 +154,74 @@ private:
         double most = 0; // a pair's points are those of the first way that resolves it
         for (uint32_t i = 0; i < resolving; ++i) most = std::max(most, gain(points_[i], ways_[i].normal, kFartherOut));
         const auto holds = [&](const dvec3& p) { return points_[resolving - 1].holds(p, same_point(), extent); };
-        return most > 0 || !last_.any(holds) ? most : same_point(); // what is known is found again
+        return most > 0 || !candidates_.last.any(holds) ? most : same_point(); // what is known is found again
     }
-    // One more than the number of a patch, or way, along which the nodes only touch, or that resolves all pairs below
-    // them if they are flat, with their normal.
+    // One more than the number of a patch, or way, that resolves all pairs below them.
     uint32_t resolving_patch(const NodePair& pair) {
-        std::optional<dvec3> normal; // if it is asked for
-        for (uint32_t i = 0; i < (settled_ ? way_count_ : patches_.count()); ++i) {
-            const dvec3 n = settled_ ? ways_[i].normal : patches_[i].normal();
-            const double depth = settled_ ? ways_[i].depth : patches_[i].overlap(), overlap = pair.overlap(n);
-            if (!(overlap <= depth + same_point())) continue;
-            if (overlap <= same_point()) return i + 1;
-            if (!normal) normal = pair.normal();
-            if (std::abs(glm::dot(n, *normal)) > kSameAsFace) return i + 1;
+        std::optional<dvec3> normal; // once it is asked for
+        const bool of_patches = phase_ == Phase::normals;
+        for (uint32_t i = 0; i < (of_patches ? patches_.count() : way_count_); ++i) {
+            const Way way = of_patches ? Way{patches_[i].normal(), patches_[i].overlap()} : ways_[i];
+            if (pair.resolved_by(way, same_point(), normal)) return i + 1;
         }
         return 0;
     }
 
-    void add(const MeetingPair& pair) { settled_ ? add_points(pair) : add_normals(pair); }
+    void add(const MeetingPair& pair, uint64_t number) {
+        if (phase_ == Phase::seek) { // waits until there are enough
+            if (number < kMany) return;
+            if (!begin_one_way(search_.pairs)) add_all(Phase::normals, search_.pairs);
+        }
+        if (phase_ == Phase::one_way) return one_way_.add(pair);
+        phase_ == Phase::normals ? add_normals(pair, number) : add_points(pair, repeats_ ? own_[number] : Own{});
+    }
+    void add_all(Phase phase, std::span<const MeetingPair> pairs) {
+        phase_ = phase;
+        for (size_t i = 0; i < pairs.size(); ++i) add(pairs[i], i);
+    }
+    // All pairs that were found, once more.
+    void again(Phase phase, std::span<const MeetingPair> first) {
+        looked_at_ = resolved_ = 0, repeats_ = search_.found < std::min(many_, kMany);
+        if (repeats_) return add_all(phase, first);
+        phase_ = phase, search_.stats = {}, search_.other_tests = 0, search_.found = 0; // what they count is known
+        traverse(search_);
+    }
+
+    // ---- all pairs in one way ----
+
+    bool begin_one_way(std::span<const MeetingPair> some) {
+        if (!one_way_.begin(some)) return false;
+        phase_ = Phase::one_way, way_count_ = 1, reduce_ = true;
+        for (const MeetingPair& pair : some) one_way_.add(pair);
+        return true;
+    }
+    // False if the bodies have none, or several.
+    bool in_one_way(std::span<const MeetingPair> first) {
+        if (one_way_.confirm()) return true;
+        reduce_ = false;
+        while (one_way_.turn()) {
+            again(Phase::one_way, first);
+            if (one_way_.confirm()) return true;
+        }
+        return false;
+    }
 
     // ---- the first pass ----
 
-    void add_normals(const MeetingPair& pair) {
-        if (search_.found == 0) first_ = pair;
+    void add_normals(const MeetingPair& pair, uint64_t number) {
+        if (number == 0) first_ = pair;
         KnownOverlap known;
         patches_.for_each([&](const Patch& p) {
             if (p.overlap() < known.overlap && pairs_.resolves(p.normal(), p.overlap(), pair))
                 known = {p.normal(), p.overlap()};
         });
         const ContactsOfPair found = pairs_.by_itself(pair, known);
-        if (search_.found < kMany)
-            own_[search_.found] =
-                found.count == 0 ? Own{} : Own{found.contacts[0].normal, found.certain, waiting_.count};
-        if (of_ellipsoids_ && search_.found < kWaiting) waiting_.contacts[search_.found] = found.contacts[0];
+        const bool of_triangles = pair.triangle_a != kNoTriangle && pair.triangle_b != kNoTriangle;
+        if (number < kMany) own_[number] = {};
+        if (number < kMany && found.count > 0 && (of_triangles || of_ellipsoids_))
+            own_[number] = {true, found.certain, of_ellipsoids_ ? static_cast<uint32_t>(number) : waiting_.count,
+                            found.contacts[0].normal};
+        if (of_ellipsoids_ && number < kWaiting) waiting_.contacts[number] = found.contacts[0];
         for (const Contact& c : found) {
             if (found.certain) { // what is no better than what resolves it gives points, not a direction
                 take(c, c.overlap <= known.overlap + same_point());
@@ -218,7 +233,7 @@ private:
     }
     void take(const Contact& c, bool with_normal) {
         const double weight = with_normal ? weight_of(c.depth) : 0;
-        patches_.add(c.normal, candidate(c), weight, with_normal ? c.overlap : -HUGE_VAL);
+        patches_.add(c.normal, candidates_.of(c), weight, with_normal ? c.overlap : -HUGE_VAL);
     }
     double weight_of(double depth) const {
         return std::max(0.0, depth + search_.options.margin) + kLeastWeight * size_;
@@ -238,14 +253,29 @@ private:
 
     // ---- between the passes ----
 
+    // Settles the normals and depths of the manifolds. Not inlined, so that its groups are not on the stack during the
+    // passes.
+    [[gnu::noinline]] void settle() {
+        flush();
+        reduce_ = search_.found >= many_ && !gives_up();
+        Group groups[Patches::kMost];
+        const uint32_t count = group_patches(groups);
+        bool needed[Patches::kMost];
+        std::fill_n(needed, count, true);
+        for (uint32_t i = 0; i < count; ++i)
+            for (uint32_t j = 0; j < count && needed[i]; ++j)
+                if (j != i && needed[j]) needed[i] = !resolves_all(groups[j], groups[i]);
+        for (uint32_t i = 0; i < count && way_count_ < kManifolds; ++i)
+            if (needed[i]) ways_[way_count_] = groups[i].way, points_[way_count_] = groups[i].deepest, ++way_count_;
+    }
     // All patches, the deepest first.
     uint32_t group_patches(Group (&groups)[Patches::kMost]) {
         uint32_t count = 0;
         patches_.for_each([&](const Patch& p) {
-            const dvec3 n = pairs_.shortest_way(p);
+            const dvec3 n = bodies_.shortest_way(p);
             Group group{.patch = &p, .way = {n, p.depth()}, .deepest = Patch(n)};
-            auto add = [&](const Contact& c) { add_to(group.deepest, n, c); };
-            pairs_.deepest(p, n, {[](void* user, const Contact& c) { (*static_cast<decltype(add)*>(user))(c); }, &add});
+            const auto add = [&](const Contact& c) { add_to(group.deepest, n, c); };
+            bodies_.deepest(p, {n, p.overlap()}, add);
             group.way.depth = std::max(group.way.depth, group.deepest.depth());
             uint32_t at = count++;
             for (; at > 0 && group.way.depth > groups[at - 1].way.depth; --at) groups[at] = groups[at - 1];
@@ -265,10 +295,12 @@ private:
 
     // ---- the second pass ----
 
-    void add_points(const MeetingPair& pair) {
-        const bool has_triangle = pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle;
-        if (has_triangle && add_along_ways(pair)) return;
-        for (const Contact& c : pairs_.by_itself(pair)) add_by_itself(c);
+    void add_points(const MeetingPair& pair, const Own& own) {
+        if (of_ellipsoids_ && own.known) return add_by_itself(waiting_.contacts[own.waiting]);
+        if (!of_ellipsoids_ && add_along_ways(pair)) return;
+        if (own.known && !own.certain) return add_by_itself(waiting_.contacts[own.waiting]);
+        const ContactsOfPair found = own.known ? pairs_.along(own.normal, pair) : pairs_.by_itself(pair);
+        for (const Contact& c : found) add_by_itself(c);
     }
     // False if the pair may have others.
     bool add_along_ways(const MeetingPair& pair) {
@@ -280,15 +312,6 @@ private:
         }
         return false;
     }
-    // What two triangles had in the first pass.
-    void add_own(const MeetingPair& pair, const Own& own) {
-        if (own.normal == dvec3(0))
-            for (const Contact& c : pairs_.by_itself(pair)) add_by_itself(c);
-        else if (own.certain)
-            for (const Contact& c : pairs_.along(own.normal, pair)) add_by_itself(c);
-        else
-            add_by_itself(waiting_.contacts[own.waiting]);
-    }
     void add_by_itself(const Contact& c) {
         Patch* const patch =
             std::find_if(points_, points_ + way_count_, [&](const Patch& p) { return p.takes(c.normal); });
@@ -296,27 +319,20 @@ private:
     }
 
     void add_to(Patch& patch, const dvec3& normal, const Contact& c) const {
-        patch.add(normal, candidate(c), 0, c.overlap, same_point());
-    }
-    Candidate candidate(const Contact& c) const {
-        const uint64_t id = exchanged_ ? id_of(c.b, c.a) : id_of(c.a, c.b);
-        return {.middle = c.middle,
-                .depth = c.depth,
-                .id = id,
-                .known = last_.knows(id, c.normal),
-                .normal = c.normal,
-                .pair = c.pair};
+        patch.add(normal, candidates_.of(c), 0, c.overlap, same_point());
     }
 
     CollideSearch& search_;
-    const bool exchanged_;
     const uint64_t many_;
-    bool settled_ = false, reduce_ = false;
+    Phase phase_ = Phase::seek;
+    bool reduce_ = false, repeats_ = false;
     uint64_t looked_at_ = 0, resolved_ = 0; // pairs of nodes, of this pass
     static constexpr uint32_t kFirstSiftBit = CollideSearch::kSiftBits & -CollideSearch::kSiftBits;
-    const LastContacts& last_;
     const double size_;
-    PairContacts pairs_;
+    TouchingBodies bodies_;
+    const PairContacts pairs_;
+    const Candidates candidates_;
+    OneWay one_way_;
     MeetingPair first_;
     Patches patches_; // of the first pass, for their normals
     static constexpr uint32_t kWaiting = 128;
@@ -356,16 +372,7 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
     out.stats.triangle_tests += search.other_tests;
     if (!std::isfinite(search.b_to_a.distance)) return out; // no place for points
 
-    if (search.found > 0) {
-        collector.settle();
-        search.stats = {}, search.other_tests = 0; // what they count is known
-        if (out.found < std::min(many, kMany)) {
-            collector.repeat({met, static_cast<size_t>(out.found)});
-        } else {
-            search.found = 0;
-            traverse(search);
-        }
-    }
+    if (search.found > 0) collector.finish({met, static_cast<size_t>(std::min(search.found, kMany))});
     const Patch* patches[kManifolds];
     manifolds.count = collector.patches(patches);
     for (uint32_t i = 0; i < manifolds.count; ++i) {

@@ -24,8 +24,8 @@ bool instead(const Candidate& old, const Candidate& other, double ahead, double 
 
 } // namespace
 
-Patch::Patch(const dvec3& normal) noexcept
-    : Patch(normal, glm::cross(normal, std::abs(normal.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0))) {}
+Patch::Patch(const dvec3& normal, double lean) noexcept
+    : Patch(normal, glm::cross(normal, std::abs(normal.x) < 0.6 ? dvec3(1, 0, 0) : dvec3(0, 1, 0)), lean) {}
 
 Patch::Patch(const dvec3& normal, const dvec3& along, double lean) noexcept : seed_(normal), lean_(lean) {
     x_ = glm::normalize(along - glm::dot(along, normal) * normal);

@@ -45,9 +45,9 @@ class Patch {
 public:
     static constexpr uint32_t kSieve = 9; ///< the deepest; the farthest in eight directions
 
-    explicit Patch(const glm::dvec3& normal) noexcept;
-    /// `along`: what the first of directions() is to be, about; not parallel to the normal. `lean`: what a point counts
-    /// as farther out for each metre that it is deeper.
+    /// `lean`: what a point counts as farther out for each metre that it is deeper.
+    explicit Patch(const glm::dvec3& normal, double lean = 0) noexcept;
+    /// `along`: what the first of directions() is to be, about; not parallel to the normal.
     Patch(const glm::dvec3& normal, const glm::dvec3& along, double lean = 0) noexcept;
     Patch() = default;
 
@@ -57,6 +57,10 @@ public:
     /// True if the candidate takes a place.
     bool add(const glm::dvec3& normal, const Candidate& candidate, double weight, double overlap,
              double same_point) noexcept;
+    /// Gives the deepest point this depth, if it is greater.
+    void deepen(double depth) noexcept {
+        if (depth > reach_[0]) kept_[best_[0]].depth = reach_[0] = depth;
+    }
     /// The directions that points are the farthest along, and against.
     std::array<glm::dvec3, 4> directions() const noexcept {
         constexpr double kDiagonal = 0.7071067811865476;
@@ -85,7 +89,8 @@ public:
         for (uint32_t i = 0; i < 4; ++i) {
             const Extent along = extent(ways[i]);
             const double same = std::max(same_point, share * (reach_[1 + i] + reach_[5 + i]));
-            most = std::max(most, std::max(along.high - reach_[1 + i], -along.low - reach_[5 + i]) - same);
+            most =
+                std::max(most, std::max(along.high - reach_[1 + i], -along.low - reach_[5 + i]) + lean_ * depth - same);
         }
         return most;
     }

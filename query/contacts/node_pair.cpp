@@ -98,6 +98,14 @@ double NodePair::overlap(const dvec3& n) const noexcept {
     return -gap_along(n, a_, b_, s_.b_to_a);
 }
 
+bool NodePair::resolved_by(const Way& way, double same_point, std::optional<dvec3>& normal) const noexcept {
+    const double between = overlap(way.normal);
+    if (!(between <= way.depth + same_point)) return false;
+    if (between <= same_point) return true;
+    if (!normal) normal = this->normal();
+    return std::abs(glm::dot(way.normal, *normal)) > kSameAsFace;
+}
+
 Extent NodePair::extent(const dvec3& d) const noexcept {
     const Extent of_a = extent_of(a_, d), of_b = extent_of(b_, d * s_.b_to_a.rotation); // the transpose times it
     const double shift = glm::dot(d, s_.b_to_a.translation), beside = 0.5 * s_.options.margin;

@@ -8,11 +8,12 @@
 #pragma once
 
 #include "query/collide/search.hpp"
-#include "query/contacts/manifold.hpp"
+#include "query/contacts/bodies.hpp"
 
 #include <glm/vec3.hpp>
 
 #include <cstdint>
+#include <optional>
 
 namespace prolate::query {
 
@@ -27,6 +28,9 @@ public:
     double overlap(const glm::dvec3& n) const noexcept;
     /// Where along d, in A's frame, points of contact may lie.
     Extent extent(const glm::dvec3& d) const noexcept;
+    /// Do they only touch along the way, or does it resolve all pairs below them, if they are flat, with their normal?
+    /// Keeps normal() once it has asked for it.
+    bool resolved_by(const Way& way, double same_point, std::optional<glm::dvec3>& normal) const noexcept;
     /// Triangles below the two.
     uint64_t triangles() const noexcept;
 
@@ -34,5 +38,21 @@ private:
     const CollideSearch& s_;
     NodeWithHull a_, b_;
 };
+
+/// Keeps those of up to a block of pairs of nodes that gain(entry) says are above 0, in ascending order. Returns their
+/// end.
+template <class Gain> Scratch::Entry* keep_gains(Scratch::Entry* begin, Scratch::Entry* end, Gain&& gain) {
+    double gains[kBlockLanes];
+    uint32_t count = 0;
+    for (const Scratch::Entry* from = begin; from < end; ++from) {
+        Scratch::Entry e = *from;
+        const double of_e = gain(e);
+        if (!(of_e > 0)) continue;
+        uint32_t at = count++;
+        for (; at > 0 && gains[at - 1] > of_e; --at) gains[at] = gains[at - 1], begin[at] = begin[at - 1];
+        gains[at] = of_e, begin[at] = e;
+    }
+    return begin + count;
+}
 
 } // namespace prolate::query

@@ -196,6 +196,20 @@ uint32_t Hills::step(uint32_t first, uint32_t second, const dvec3& up) const noe
     return top;
 }
 
+uint32_t Hills::neighbours(uint32_t vertex, std::span<uint32_t> out) const noexcept {
+    if (tests_ > most_tests_) return 0;
+    size_t count = 0;
+    const auto look = [&](uint32_t v) {
+        const auto end = out.begin() + static_cast<std::ptrdiff_t>(count);
+        if (v != vertex && count < out.size() && std::find(out.begin(), end, v) == end) out[count++] = v;
+    };
+    if (const Known* const k = known(vertex))
+        std::for_each(k->neighbours, k->neighbours + k->neighbour_count, look);
+    else
+        find(vertex, [&](const Triangle& corners) { std::for_each(corners.begin(), corners.end(), look); });
+    return static_cast<uint32_t>(count);
+}
+
 double Climb::step() noexcept {
     const uint32_t from = vertex;
     vertex = second != vertex ? hills->step(vertex, second, up) : hills->step(vertex, up);

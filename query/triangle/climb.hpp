@@ -41,6 +41,8 @@ public:
     /// From an edge on, all of which is equally high: the highest third corner of its triangles, if that is higher than
     /// the edge; else `first`.
     uint32_t step(uint32_t first, uint32_t second, const glm::dvec3& up) const noexcept;
+    /// The neighbours of a vertex, each once: of more than there is room for, some. Returns how many.
+    uint32_t neighbours(uint32_t vertex, std::span<uint32_t> out) const noexcept;
 
 private:
     // The neighbours of a vertex, each once, its triangles by the places of their other corners among these, and what

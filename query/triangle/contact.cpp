@@ -249,15 +249,15 @@ TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin,
     return out;
 }
 
-TriangleContact contact_along(const dvec3& normal, const PlacedTriangle& a, const PlacedTriangle& b,
-                              double margin) noexcept {
+TriangleContact contact_along(const dvec3& normal, const PlacedTriangle& a, const PlacedTriangle& b, double margin,
+                              double facing) noexcept {
     const TrianglePair pair(a, b);
     TriangleContact out{};
     out.normal = normal;
     const double of_a = std::abs(glm::dot(normal, unit_or_zero(pair.normal_a))),
                  of_b = std::abs(glm::dot(normal, unit_or_zero(pair.normal_b)));
     Points points(pair, margin + Axes(pair, false, false).touching(), out);
-    out.faces = std::max(of_a, of_b) > kFacing;
+    out.faces = std::max(of_a, of_b) > facing;
     if (out.faces) of_a >= of_b ? points.on_face_a() : points.on_face_b();
     return out;
 }

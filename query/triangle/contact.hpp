@@ -58,8 +58,8 @@ TriangleContact contact(const Surrounded& a, const Surrounded& b, double margin,
                         const KnownOverlap& known = {}) noexcept;
 
 /// The points along a given normal: the corners of what they cover of each other, cut with the sides of the triangle
-/// that faces it more. `faces` is false if neither does.
-TriangleContact contact_along(const glm::dvec3& normal, const PlacedTriangle& a, const PlacedTriangle& b,
-                              double margin) noexcept;
+/// that faces it more. `faces` is false if neither does, by a cosine of `facing`.
+TriangleContact contact_along(const glm::dvec3& normal, const PlacedTriangle& a, const PlacedTriangle& b, double margin,
+                              double facing = kFacing) noexcept;
 
 } // namespace prolate::query

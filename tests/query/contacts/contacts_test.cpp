@@ -494,6 +494,96 @@ TEST(Contacts, ConcaveEdgesHaveTheNormalsOfBothFaces) {
     }
 }
 
+// ---- hooks ----
+
+// The world's z onto itself and turned by `spin`; then about x by a right angle and `tilt`.
+Quat upright(double tilt, double spin) {
+    const double h = std::numbers::pi / 4 + tilt / 2, s = spin / 2;
+    return {static_cast<float>(std::sin(h) * std::cos(s)), static_cast<float>(-std::sin(h) * std::sin(s)),
+            static_cast<float>(std::cos(h) * std::sin(s)), static_cast<float>(std::cos(h) * std::cos(s))};
+}
+Vec3 moved_by(const Vec3& p, double t, const Vec3& d) {
+    return scenes::to_float({p.x + t * d.x, p.y + t * d.y, p.z + t * d.z});
+}
+
+// Two rings like links of a chain, pulled apart until their insides press against each other. Where they touch, both
+// are saddles, along which a climb goes around to the far side.
+TEST(Contacts, LinkedRingsArePushedBackIntoTheirHoles) {
+    Random random(31);
+    for (const uint32_t sides : {48u, 90u}) {
+        const Solid ring = exact(shapes::torus(1, 0.2f, sides, sides / 2));
+        for (const double depth : {0.001, 0.003, 0.01, 0.03, 0.1})
+            for (int i = 0; i < 6; ++i) {
+                const Pose a = about_z(0, 0, 0, random.in(0, 6));
+                Pose b{{}, upright(i % 2 == 0 ? 0 : random.in(-0.5, 0.5), random.in(0, 6))};
+                QueryContext context;
+                const auto meet = [&](const Vec3& at) {
+                    b.translation = at;
+                    return collide(ring.view(), a, ring.view(), b, context).verdict == Verdict::overlapping;
+                };
+                double free = 1.3, touching = 1.7;
+                for (int k = 0; k < 25; ++k) {
+                    const double middle = (free + touching) / 2;
+                    (meet(scenes::to_float({middle, 0, 0})) ? touching : free) = middle;
+                }
+                // As far as the deepest point is, they are back where they were, but for the facets; and soon apart.
+                Vec3 at = scenes::to_float({touching + depth, 0, 0});
+                int rounds = 0;
+                for (; rounds < 6 && meet(at); ++rounds) {
+                    const ContactManifolds m = i % 3 == 0 ? fresh(ring, a, ring, b) : fresh(ring, b, ring, a);
+                    ASSERT_EQ(m.count, 1u);
+                    const double d = depth_of(m.manifolds[0]), sign = i % 3 == 0 ? 1 : -1;
+                    if (rounds == 0) {
+                        EXPECT_LT(sign * m.manifolds[0].normal.x, -0.95) << sides << ' ' << depth;
+                        EXPECT_GT(d, 0.6 * depth) << sides << ' ' << depth;
+                        EXPECT_LT(d, 1.1 * depth + 1e-4) << sides << ' ' << depth;
+                    }
+                    at = moved_by(at, sign * (d + 1e-5), m.manifolds[0].normal);
+                }
+                EXPECT_LT(rounds, 6) << sides << ' ' << depth;
+                EXPECT_NEAR(at.x, touching, 0.3 * depth + 1e-3) << sides << ' ' << depth;
+            }
+    }
+}
+
+// ---- one way ----
+
+// Convex bodies that go a little into each other are apart once they are moved by what their one manifold says, and
+// that is about the shortest way. Of a hundred, the search for it misses a few.
+TEST(Contacts, OneManifoldSeparatesConvexBodies) {
+    const auto bodies = convex_bodies();
+    Random random(32);
+    int several = 0, longer = 0, meeting = 0, count = 0;
+    for (int i = 0; i < 600; ++i) {
+        const auto n = static_cast<uint32_t>(bodies.size());
+        const Solid &a = bodies[random.below(n)].solid, &b = bodies[random.below(n)].solid;
+        const Point d = random.direction();
+        const Pose pose_a{{}, random.rotation()};
+        Pose pose_b{{}, random.rotation()};
+        QueryContext context;
+        const auto meet = [&](double t) {
+            pose_b.translation = scenes::to_float({t * d[0], t * d[1], t * d[2]});
+            return collide(a.view(), pose_a, b.view(), pose_b, context).verdict == Verdict::overlapping;
+        };
+        double apart = 3, touching = 0;
+        for (int k = 0; k < 25; ++k) (meet((apart + touching) / 2) ? touching : apart) = (apart + touching) / 2;
+        const double depth = random.log_in(1e-4, 0.05);
+        if (!meet(touching - depth)) continue;
+        const ContactManifolds m = fresh(a, pose_a, b, pose_b);
+        ASSERT_GE(m.count, 1u);
+        several += m.count > 1, ++count;
+        const double found = depth_of(m.manifolds[0]);
+        EXPECT_LT(found, 1.5 * depth + 1e-4) << i;
+        longer += found > 1.02 * depth + 1e-4;
+        pose_b.translation = moved_by(pose_b.translation, 1.02 * found + 1e-5, m.manifolds[0].normal);
+        meeting += collide(a.view(), pose_a, b.view(), pose_b, context).verdict == Verdict::overlapping;
+    }
+    EXPECT_GT(count, 500);
+    EXPECT_LT(several, count / 50);
+    EXPECT_LT(longer, count / 25);
+    EXPECT_LT(meeting, count / 50);
+}
+
 TEST(Contacts, ABudgetBoundsTriangleTestsToo) {
     // A margin with which everything is near everything.
     const Solid ball = exact(shapes::icosphere(3)), sheet = exact(shapes::sheet(2, 2, 24), false);
