@@ -15,22 +15,21 @@ template <class Leaf> std::optional<RayHit> hit_by(const RaycastSearch& search, 
     return hit_within(margin, still_open, leaf);
 }
 
-bool take(RaycastSearch& search, const std::optional<RayHit>& hit, uint32_t leaf, uint32_t triangle) {
-    if (!hit || (search.found && !(hit->t < search.best.t))) return false;
+void take(RaycastSearch& search, const std::optional<RayHit>& hit, uint32_t leaf, uint32_t triangle) {
+    if (!hit || (search.found && !(hit->t < search.best.t))) return;
     search.found = true, search.best = *hit, search.node = leaf, search.triangle = triangle;
-    return true;
 }
 
 } // namespace
 
-bool RaycastSearch::meet(uint32_t at) noexcept {
+void RaycastSearch::meet(uint32_t at) noexcept {
     const TreeView& tree = body.side.tree;
     const PlacedEllipsoid e = place(body.growth ? tree.ellipsoid(at) : tree.bound(at), tree.scale());
-    return take(*this, hit_by(*this, e), at, kNoTriangle);
+    take(*this, hit_by(*this, e), at, kNoTriangle);
 }
 
-bool RaycastSearch::meet_triangle(uint32_t leaf, uint32_t t) noexcept {
-    return take(*this, hit_by(*this, place(body.side.tree, t)), leaf, t);
+void RaycastSearch::meet_triangle(uint32_t leaf, uint32_t t) noexcept {
+    take(*this, hit_by(*this, place(body.side.tree, t)), leaf, t);
 }
 
 } // namespace prolate::query

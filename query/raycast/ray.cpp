@@ -130,15 +130,19 @@ std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Conv
     return RayHit{t, room >= 0 ? n : dvec3(0)};
 }
 
+// Without branches, which directions of many rays would have guessed wrong.
 RayShear shear_to_axis(const dvec3& d) {
-    const size_t k = std::abs(d.x) > std::abs(d.y) ? (std::abs(d.x) > std::abs(d.z) ? 0 : 2)
-                                                   : (std::abs(d.y) > std::abs(d.z) ? 1 : 2);
-    const size_t i = (k + 1) % 3, j = (k + 2) % 3;
-    const double along = d[static_cast<glm::length_t>(k)];
+    const double x = std::abs(d.x), y = std::abs(d.y), z = std::abs(d.z);
+    const auto x_is_longest = static_cast<size_t>(x > y) & static_cast<size_t>(x > z),
+               y_is_longest = static_cast<size_t>(!(x > y)) & static_cast<size_t>(y > z);
+    const size_t k = 2 - 2 * x_is_longest - y_is_longest;
+    constexpr size_t kNext[] = {1, 2, 0, 1};
+    const size_t i = kNext[k], j = kNext[k + 1];
+    const double axes[] = {d.x, d.y, d.z}, along = axes[k]; // glm's own [] branches
     return {.i = i,
             .j = j,
             .k = k,
-            .shear = {d[static_cast<glm::length_t>(i)] / along, d[static_cast<glm::length_t>(j)] / along},
+            .shear = {axes[i] / along, axes[j] / along},
             .sign = along < 0 ? -1.0 : 1.0,
             .per_t = std::abs(along)};
 }

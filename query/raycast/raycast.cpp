@@ -15,7 +15,7 @@
 
 namespace prolate {
 
-using query::to_double, query::to_float;
+using glm::dvec3, query::to_double, query::to_float;
 
 namespace query {
 namespace {
@@ -61,9 +61,14 @@ RaycastSearch::RaycastSearch(const RaycastBody& of_all, const Ray& world_ray, bo
 
 namespace {
 
+dvec3 face_normal(const TreeView& tree, uint32_t triangle) {
+    const auto [a, b, c] = tree.triangle(triangle);
+    const dvec3 from = query::position(tree, a);
+    return glm::cross(query::position(tree, b) - from, query::position(tree, c) - from);
+}
+
 // Completes what is hit.
 void complete_hit(const query::RaycastSearch& search, const Ray& ray, RaycastResult& out) {
-    using glm::dvec3;
     const query::RaycastBody& body = search.body;
     const dvec3 direction = to_double(ray.direction);
     out.verdict = Verdict::overlapping;
@@ -71,7 +76,7 @@ void complete_hit(const query::RaycastSearch& search, const Ray& ray, RaycastRes
     out.node = search.node, out.triangle = search.triangle;
     dvec3 normal = search.best.normal;
     if (search.triangle != kNoTriangle && !(body.options.margin > 0))
-        normal = query::face_normal(query::place(body.side.tree, search.triangle));
+        normal = face_normal(body.side.tree, search.triangle);
     // Scaled first: the products of tiny or huge edges may lie beyond a double's squares.
     const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
     normal = largest > 0 ? normal / largest * body.rotation : -direction;
@@ -81,7 +86,6 @@ void complete_hit(const query::RaycastSearch& search, const Ray& ray, RaycastRes
 
 void complete(const query::RaycastSearch& search, const Ray& ray, RaycastResult& out) {
     out.stats = search.stats;
-    out.stats.deepest_level = search.body.side.tree.level_of(search.deepest);
     if (search.finished && !search.found) {
         out.verdict = Verdict::separated, out.clear = ray.max_t;
         return;

@@ -52,7 +52,7 @@ public:
         base_ = top_ = search.body.stacks + place * search.body.stack_size;
         left_ = search.body.options.max_pair_tests;
         place_in_lattice(search);
-        return open(0, 1, 0);
+        return open(0, 1, 0, 0);
     }
 
     // The lanes of the block that may be met become a family on the stack, but for leaves whose triangles come next.
@@ -61,7 +61,7 @@ public:
         const int32_t step_exponent = side_->lattice.step_exponent;
         const Float limit = set(limit_);
         const size_t count = std::min<size_t>(siblings_, kBlockLanes);
-        top_->first = first_, waiting_lanes_ = 0;
+        top_->first = first_, top_->level = level_, waiting_lanes_ = 0;
         const auto keep = [&](size_t i, Float enter, Float leave) {
             Mask met = (enter <= leave) & hn::FirstN(FloatTag(), count - std::min(count, i));
             if constexpr (kMeets == Meets::triangles) {
@@ -91,32 +91,49 @@ public:
         siblings_ -= static_cast<uint32_t>(count);
     }
 
-    // Up to four triangles of these leaves.
-    bool gather_triangles() {
-        if (leaves_ != 0) gather();
-        return has_triangles();
-    }
-    bool has_triangles() const { return waiting_ != 0; }
-    HWY_INLINE void test_triangles() {
-        hits_ =
-            hit_four(side_->tree, triangles_, s_->ray, s_->body.root.reach, s_->found ? s_->best.t : s_->ray.length);
-    }
-    // True if there are more of them.
-    bool meet_triangles() {
-        bool better = false;
-        for (uint32_t rest = hits_.certain; rest != 0; rest &= rest - 1) {
-            const auto i = static_cast<uint32_t>(std::countr_zero(rest));
-            if (s_->found && !(hits_.t[i] < s_->best.t)) continue;
-            s_->found = better = true, s_->best.t = hits_.t[i];
-            s_->node = nodes_[i], s_->triangle = triangles_.index[i];
+    // Are there triangles to meet?
+    bool at_leaves() const { return leaves_ != 0; }
+
+    // Takes up to four triangles off the leaves, if the tests suffice.
+    void gather() {
+        constexpr uint32_t kFour = RayTriangles::kLanes;
+        for (gathered_ = 0; leaves_ != 0 && gathered_ < kFour;) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(leaves_));
+            const uint32_t from = first_triangle(block_, lane) + of_leaf_,
+                           count = load_le<uint8_t>(block_ + kBlockCount + lane) - uint32_t{kTriangleLeaf};
+            if (of_leaf_ == 0) {
+                if (!afford(count)) {
+                    leaves_ = 0;
+                    break;
+                }
+                s_->stats.triangle_tests += count;
+                hwy::Prefetch(side_->tree.raw().triangles() +
+                              size_t{from} * 3 * index_bytes(side_->tree.vertex_count()));
+            }
+            for (uint32_t i = 0; i < kFour; ++i) // without a guess of how many there are
+                nodes_[gathered_ + i] = first_ + lane, triangles_.index[gathered_ + i] = from + i;
+            const uint32_t some = std::min(count - of_leaf_, kFour - gathered_);
+            const bool all = of_leaf_ + some == count;
+            gathered_ += some, of_leaf_ = all ? 0 : of_leaf_ + some;
+            leaves_ = all ? leaves_ & (leaves_ - 1) : leaves_;
         }
+        for (uint32_t i = 1; i < kFour; ++i) // the first one again, for want of others
+            triangles_.index[i] = triangles_.index[i < gathered_ ? i : 0], nodes_[i] = nodes_[i < gathered_ ? i : 0];
+    }
+    HWY_INLINE void test_triangles() {
+        hits_ = hit_four(side_->tree, triangles_, s_->ray, s_->body.root.reach, std::min(s_->best.t, s_->ray.length));
+    }
+    void meet_triangles() {
+        if (gathered_ == 0) return;
+        const uint32_t node = nodes_[hits_.lane], triangle = triangles_.index[hits_.lane];
+        const bool better = hits_.t < s_->best.t;
+        s_->best.t = std::min(s_->best.t, hits_.t), s_->found = s_->found || better;
+        s_->node = better ? node : s_->node, s_->triangle = better ? triangle : s_->triangle;
         for (uint32_t rest = hits_.open; rest != 0; rest &= rest - 1) {
             const auto i = static_cast<uint32_t>(std::countr_zero(rest));
-            better = s_->meet_triangle(nodes_[i], triangles_.index[i]) || better;
+            s_->meet_triangle(nodes_[i], triangles_.index[i]);
         }
-        if (better) taken();
-        waiting_ = 0;
-        return gather_triangles();
+        heed_best();
     }
 
     // Turns to the next block. False if the search ends.
@@ -126,10 +143,10 @@ public:
         if (std::has_single_bit(waiting_lanes_) && siblings_ == 0) { // as it is most often, and sooner found
             const auto lane = static_cast<uint32_t>(std::countr_zero(waiting_lanes_)) % kBlockLanes;
             const float bound = top_->bounds[lane];
-            if (bound <= limit_ && !ends(first_, block_, lane)) return open_children(block_, lane, bound);
+            if (bound <= limit_ && !ends(first_, block_, lane)) return open_children(block_, lane, bound, level_);
         }
         push();
-        if (siblings_ > 0) return open(first_ + kBlockLanes, siblings_, bound_);
+        if (siblings_ > 0) return open(first_ + kBlockLanes, siblings_, bound_, level_);
         while (top_ != base_) {
             RayFamily& family = top_[-1];
             const uint32_t lane = nearest(family);
@@ -139,7 +156,7 @@ public:
             if (family.waiting == 0) --top_;
             if (bound > limit_) continue;
             const std::byte* const block = block_of(family.first);
-            if (!ends(family.first, block, lane)) return open_children(block, lane, bound);
+            if (!ends(family.first, block, lane)) return open_children(block, lane, bound, family.level);
             if (!meet(family.first + lane)) return end(bound);
             if (done_) return end(kNever);
         }
@@ -148,7 +165,7 @@ public:
     // Of what is told after the search.
     void finish() const {
         s_->stats.pair_tests = s_->body.options.max_pair_tests - left_ - s_->stats.triangle_tests;
-        s_->stats.block_tests = blocks_, s_->deepest = deepest_;
+        s_->stats.block_tests = blocks_, s_->stats.deepest_level = deepest_;
     }
 
 private:
@@ -192,13 +209,14 @@ private:
         return kMeets != Meets::triangles && (side_->leaf_lanes(first, block) >> lane & 1) != 0;
     }
 
-    HWY_INLINE bool open_children(const std::byte* block, uint32_t lane, float bound) {
-        return open(first_child(block, lane), load_le<uint8_t>(block + kBlockCount + lane), bound);
+    HWY_INLINE bool open_children(const std::byte* block, uint32_t lane, float bound, uint32_t level) {
+        return open(first_child(block, lane), load_le<uint8_t>(block + kBlockCount + lane), bound, level + 1);
     }
-    HWY_INLINE bool open(uint32_t first, uint32_t siblings, float bound) {
+    HWY_INLINE bool open(uint32_t first, uint32_t siblings, float bound, uint32_t level) {
+        first_ = first, siblings_ = siblings, bound_ = bound, level_ = level;
         if (!afford(std::min(siblings, kBlockLanes))) return end(bound);
-        first_ = first, siblings_ = siblings, bound_ = bound, block_ = block_of(first);
-        ++blocks_, deepest_ = std::max(deepest_, first);
+        block_ = block_of(first);
+        ++blocks_, deepest_ = std::max(deepest_, level);
         hwy::Prefetch(block_ + kBlockCount), hwy::Prefetch(block_ + kBlockBoxLow);
         return true;
     }
@@ -232,12 +250,12 @@ private:
                                                double{body.options.margin} * body.per_step, lattice_ray_);
     }
 
-    // A hit is the best now.
-    void taken() {
+    // The best hit may have changed.
+    HWY_INLINE void heed_best() {
         const double limit = s_->best.t / s_->ray.length;
         // Rounded up; below the kernel's margin anyway, as is the division's rounding.
-        if (limit < 1) limit_ = std::min(1.0f, next_above(static_cast<float>(limit)));
-        done_ = s_->any || !(s_->best.t > 0);
+        limit_ = limit < 1 ? std::min(1.0f, next_above(static_cast<float>(limit))) : 1.0f;
+        done_ = (s_->any && s_->found) || !(s_->best.t > 0);
     }
     static float next_above(float x) { // x >= 0
         return std::bit_cast<float>(std::bit_cast<uint32_t>(std::abs(x)) + 1);
@@ -248,29 +266,10 @@ private:
         const TriangleRange triangles = kGrown ? TriangleRange{} : side_->tree.triangles(at);
         if (!afford(triangles.count)) return false;
         s_->stats.triangle_tests += triangles.count;
-        bool better = triangles.count == 0 && s_->meet(at);
-        for (uint32_t i = 0; i < triangles.count; ++i) better = s_->meet_triangle(at, triangles.first + i) || better;
-        if (better) taken();
+        if (triangles.count == 0) s_->meet(at);
+        for (uint32_t i = 0; i < triangles.count; ++i) s_->meet_triangle(at, triangles.first + i);
+        heed_best();
         return true;
-    }
-
-    // Takes triangles off the leaves, if the tests suffice.
-    void gather() {
-        for (; leaves_ != 0 && waiting_ < RayTriangles::kLanes; leaves_ &= leaves_ - 1, of_leaf_ = 0) {
-            const auto lane = static_cast<uint32_t>(std::countr_zero(leaves_));
-            const uint32_t from = first_triangle(block_, lane),
-                           count = load_le<uint8_t>(block_ + kBlockCount + lane) - uint32_t{kTriangleLeaf};
-            if (of_leaf_ == 0) {
-                if (!afford(count)) break;
-                s_->stats.triangle_tests += count;
-            }
-            while (of_leaf_ < count && waiting_ < RayTriangles::kLanes)
-                nodes_[waiting_] = first_ + lane, triangles_.index[waiting_++] = from + of_leaf_++;
-            if (of_leaf_ < count) return;
-        }
-        if (!s_->finished) leaves_ = 0;
-        for (uint32_t i = waiting_; i < RayTriangles::kLanes && waiting_ > 0; ++i) // one again, for want of others
-            nodes_[i] = nodes_[0], triangles_.index[i] = triangles_.index[0];
     }
 
     RaycastSearch* s_;
@@ -283,11 +282,11 @@ private:
     bool done_ = false; // nothing that waits matters
     // The block that is looked at, how many siblings lie in it and after, and the bound of their parent.
     const std::byte* block_;
-    uint32_t first_, siblings_;
+    uint32_t first_, siblings_, level_;
     float bound_;
     uint32_t waiting_lanes_ = 0; // of it, at top_
-    // Leaves of it whose triangles are still to be met, the next of the first one's, and those at hand.
-    uint32_t leaves_ = 0, of_leaf_ = 0, waiting_ = 0, nodes_[RayTriangles::kLanes];
+    // Leaves of it whose triangles are still to be met, how many of the first one's were, and those at hand.
+    uint32_t leaves_ = 0, of_leaf_ = 0, gathered_ = 0, nodes_[2 * RayTriangles::kLanes] = {};
     RayTriangles triangles_;
     FourHits hits_;
 };
@@ -297,22 +296,32 @@ template <Meets kMeets, size_t kMost> void traverse_rays(std::span<RaycastSearch
     Traversal rays[kMost];
     Traversal* active[kMost];
     uint32_t left = 0;
-    for (size_t i = 0; i < searches.size(); ++i)
-        if (rays[i].begin(searches[i], i)) active[left++] = rays + i;
+    for (size_t i = 0; i < searches.size(); ++i) {
+        active[left] = rays + i;
+        left += active[left]->begin(searches[i], i);
+    }
     while (left > 0) {
-        for (uint32_t i = 0; i < left; ++i) active[i]->test();
-        bool triangles = false;
-        for (uint32_t i = 0; i < left; ++i) triangles = active[i]->gather_triangles() || triangles;
-        while (triangles) {
-            for (uint32_t i = 0; i < left; ++i)
-                if (active[i]->has_triangles()) active[i]->test_triangles();
-            triangles = false;
-            for (uint32_t i = 0; i < left; ++i)
-                if (active[i]->has_triangles()) triangles = active[i]->meet_triangles() || triangles;
+        Traversal* at_leaves[kMost];
+        uint32_t some = 0;
+        for (uint32_t i = 0; i < left; ++i) {
+            active[i]->test();
+            at_leaves[some] = active[i], some += active[i]->at_leaves();
+        }
+        while (some > 0) {
+            for (uint32_t i = 0; i < some; ++i) at_leaves[i]->gather();
+            for (uint32_t i = 0; i < some; ++i) at_leaves[i]->test_triangles();
+            uint32_t stay = 0;
+            for (uint32_t i = 0; i < some; ++i) {
+                at_leaves[i]->meet_triangles();
+                at_leaves[stay] = at_leaves[i], stay += at_leaves[i]->at_leaves();
+            }
+            some = stay;
         }
         uint32_t stay = 0;
-        for (uint32_t i = 0; i < left; ++i)
-            if (active[i]->next()) active[stay++] = active[i];
+        for (uint32_t i = 0; i < left; ++i) {
+            active[stay] = active[i];
+            stay += active[i]->next();
+        }
         left = stay;
     }
     for (size_t i = 0; i < searches.size(); ++i) rays[i].finish();

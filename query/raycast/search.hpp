@@ -22,7 +22,7 @@ inline constexpr uint32_t kRaysAtOnce = 8;
 /// Siblings of a block that wait on a ray's stack.
 struct RayFamily {
     float bounds[kBlockLanes]; ///< the ray enters them no sooner; infinite of those that are done with, or not met
-    uint32_t first;            ///< slot of the first
+    uint32_t first, level;     ///< slot of the first, and its level
     uint32_t waiting;          ///< lanes that still do
 };
 /// The most families that wait while a ray is at a leaf, and room for the next one.
@@ -54,21 +54,19 @@ struct RaycastSearch {
     const PlacedRay ray;
     const bool any; ///< stop at the first hit that is found
     QueryStats stats = {};
-    uint32_t deepest = 0; ///< largest slot that was tested
     bool finished = true; ///< false if the budget ran out
     bool found = false;
-    RayHit best{}; ///< of the placed ray; hits of `triangle` have no normal
+    RayHit best{std::numeric_limits<double>::infinity(), {}}; ///< of the placed ray; of a triangle without a normal
     double clear =
         std::numeric_limits<double>::infinity(); ///< of the placed ray: the least bound of what was left aside
     uint32_t node = 0, triangle = kNoTriangle;
 
     RaycastSearch(const RaycastBody& of_all, const Ray& world_ray, bool any_hit) noexcept;
 
-    /// Decides on the ellipsoid of the leaf `at`, or of a node that stands for what is below it. True if a hit is the
-    /// best now.
-    bool meet(uint32_t at) noexcept;
+    /// Decides on the ellipsoid of the leaf `at`, or of a node that stands for what is below it.
+    void meet(uint32_t at) noexcept;
     /// The same of one triangle of a leaf.
-    bool meet_triangle(uint32_t leaf, uint32_t triangle) noexcept;
+    void meet_triangle(uint32_t leaf, uint32_t triangle) noexcept;
 };
 
 /// The traversal: finds the first hit of each, or any. Of rays that are valid and not empty, all against one body and

@@ -18,8 +18,10 @@
 
 #include <prolate/tree.hpp>
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
@@ -27,7 +29,7 @@ namespace prolate::query::HWY_NAMESPACE {
 /// Triangles of a tree, one a lane.
 struct RayTriangles {
     static constexpr size_t kLanes = 4;
-    uint32_t index[kLanes];
+    uint32_t index[2 * kLanes] = {};   ///< the first of them; there is room to write four more
     alignas(16) float rows[9][kLanes]; ///< of load_corners(): coordinate i % 3 of corner i / 3, as stored
 };
 
@@ -60,11 +62,10 @@ template <class Index> HWY_INLINE void load_corners(const TreeView& tree, RayTri
     }
 }
 
-/// Bit i is of triangle i.
 struct FourHits {
-    uint32_t certain;                           ///< hit at t[i], which hit() would say, too
-    uint32_t open;                              ///< for hit() to decide
-    alignas(32) double t[RayTriangles::kLanes]; ///< of the placed ray
+    double t;      ///< of the placed ray, the first certain hit, as hit() says; infinite if there is none
+    uint32_t lane; ///< of that hit
+    uint32_t open; ///< bit i: for hit() to decide
 };
 
 /// Hits at t <= `farthest`. `reach`: at least the triangles'.
@@ -80,14 +81,16 @@ HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, cons
     const auto set = [&](double x) { return hn::Set(d, x); };
     const Lanes zero = set(0), scale = set(double{tree.scale()}), tau = set(kRayMargin * (ray.reach + reach)),
                 end = set(farthest * ray.shear.per_t);
-    FourHits out;
-    out.certain = out.open = 0;
+    alignas(32) double hit_at[RayTriangles::kLanes];
+    Lanes first_hit = set(std::numeric_limits<double>::infinity());
+    FourHits out{};
+    const double origin[] = {ray.origin.x, ray.origin.y, ray.origin.z}; // glm's own [] branches
     for (size_t at = 0; at < RayTriangles::kLanes; at += hn::MaxLanes(d)) {
         Lanes x[3], y[3], z[3];
         for (size_t c = 0; c < 3; ++c) {
             const auto relative = [&](size_t axis) {
                 const auto stored = hn::Load(hn::Rebind<float, Tag>(), triangles.rows[3 * c + axis] + at);
-                return hn::PromoteTo(d, stored) * scale - set(ray.origin[static_cast<glm::length_t>(axis)]);
+                return hn::PromoteTo(d, stored) * scale - set(origin[axis]);
             };
             const Lanes depth = relative(ray.shear.k);
             x[c] = relative(ray.shear.i) - set(ray.shear.shear[0]) * depth;
@@ -111,17 +114,22 @@ HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, cons
             doubted = hn::Or(doubted, hn::Not(hn::Or(above, below)));
         }
         const auto met = hn::Not(hn::Or(missed, hn::And(positive, negative)));
-        const uint32_t met_bits = bits(d, met);
-        if (met_bits == 0) continue;
         // All weights have the same sign for certain; it cancels.
         const Lanes mean =
                         (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / (weight[0] + weight[1] + weight[2]),
                     depth = hn::Min(hn::Max(mean, low), high);
-        const auto inside = hn::And(depth >= zero, depth <= end);
-        const uint32_t certain_bits = met_bits & bits(d, hn::AndNot(doubted, inside));
-        hn::Store(hn::Min(depth / set(ray.shear.per_t), set(ray.length)), d, out.t + at);
-        out.certain |= certain_bits << at, out.open |= (met_bits & ~certain_bits) << at;
+        const auto certain = hn::And(met, hn::AndNot(doubted, hn::And(depth >= zero, depth <= end)));
+        const Lanes t = hn::Min(depth / set(ray.shear.per_t), set(ray.length));
+        const Lanes hit = hn::IfThenElse(certain, t, set(std::numeric_limits<double>::infinity()));
+        hn::Store(hit, d, hit_at + at);
+        first_hit = hn::Min(first_hit, hit);
+        out.open |= bits(d, hn::AndNot(certain, met)) << at;
     }
+    first_hit = hn::MinOfLanes(d, first_hit);
+    uint32_t first = 0;
+    for (size_t at = 0; at < RayTriangles::kLanes; at += hn::MaxLanes(d))
+        first |= bits(d, hn::Load(d, hit_at + at) == first_hit) << at;
+    out.t = hn::GetLane(first_hit), out.lane = static_cast<uint32_t>(std::countr_zero(first)) % RayTriangles::kLanes;
     return out;
 }
 
