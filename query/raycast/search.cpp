@@ -138,8 +138,8 @@ public:
 
     // Turns to the next block. False if the search ends.
     bool next() {
+        if (!s_->finished) return end(bound_); // leaves of the block are left, also where others are hit
         if (done_) return end(siblings_ > 0 ? bound_ : kNever);
-        if (!s_->finished) return end(bound_);
         if (std::has_single_bit(waiting_lanes_) && siblings_ == 0) { // as it is most often, and sooner found
             const auto lane = static_cast<uint32_t>(std::countr_zero(waiting_lanes_)) % kBlockLanes;
             const float bound = top_->bounds[lane];

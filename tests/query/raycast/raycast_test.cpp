@@ -527,7 +527,7 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
             ASSERT_LE(any.clear, result.t);
             ASSERT_LT(result.triangle, tree.triangle_count());
             ASSERT_NEAR(static_cast<double>(length(vector(result.normal))), 1, 1e-6);
-            for (const uint64_t most : {0, 1, 5, 9, 17, 40}) {
+            for (const uint64_t most : {0, 1, 5, 9, 17, 40, 60, 80}) {
                 options.max_pair_tests = most;
                 const RaycastResult some = cast(tree, pose, ray, options);
                 ASSERT_NE(some.verdict, Verdict::separated);
@@ -535,6 +535,11 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
                 ASSERT_LE(some.clear, result.t * (1 + 1e-6));
                 ASSERT_GE(some.t, result.t);
                 budgets += some.verdict == Verdict::undecided && some.clear > 0;
+                // A hit ends the search, also where leaves beside it were beyond the budget.
+                const RaycastResult some_any = raycast_any(tree, pose, ray, context(), options);
+                ASSERT_NE(some_any.verdict, Verdict::separated);
+                ASSERT_LE(some_any.clear, result.t * (1 + 1e-6));
+                ASSERT_GE(some_any.t, result.t);
             }
         }
         EXPECT_GT(met, count / 4) << size;
