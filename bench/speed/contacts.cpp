@@ -83,6 +83,11 @@ void box_on_ground(benchmark::State& state) {
     on_ground(state, box.view(), -0.5f, 1e-3);
 }
 BENCHMARK(box_on_ground);
+void cylinder_on_ground(benchmark::State& state) { // on its end
+    const Tree cylinder = std::move(*cylinder_tree(0.5f, 0.5f, 128));
+    on_ground(state, cylinder.view(), -0.5f, 1e-3);
+}
+BENCHMARK(cylinder_on_ground);
 void flange_on_ground(benchmark::State& state) { // 5,000 triangles
     const scenes::ExactScene scene = scenes::exact_tree(flange());
     on_ground(state, *TreeView::open(scene.bytes), 0, 1e-3);
