@@ -340,7 +340,7 @@ private:
     double below_ = 0, beyond_[4] = {};
     dvec3 ways_[2];
     HeightOutline outline_;
-    uint32_t seen_[16]; // corners that were added last: most belong to several triangles
+    uint32_t seen_[64]; // corners that were added last: most belong to several triangles
     const Ground& ground_;
     HeightSearch s_;
     Touching touching_;

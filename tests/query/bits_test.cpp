@@ -142,7 +142,7 @@ TEST(Bits, CollideAll) {
 }
 
 TEST(Bits, HalfSpace) {
-    expect_bits(15835808481281690275u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(1114871461955767402u, [](Bits& bits, const Scenes::Pair& p) {
         const HalfSpace ground{p.pose_b.translation, 0.1f};
         const DistanceResult d = distance(p.a, p.pose_a, ground, context());
         bits.add_all(d.verdict, d.lower, d.upper, d.point_a, d.point_b, d.normal, d.pair.node_a, d.stats);
