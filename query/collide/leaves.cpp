@@ -94,6 +94,16 @@ bool CollideSearch::meet(uint32_t node_a, uint32_t node_b, const glm::dvec3& nor
         return false;
     }
     if (normal != glm::dvec3(0) && separated_along(normal, in_a, in_b)) return !spend(1);
+    const uint32_t pair_count = in_a.count * in_b.count;
+    if (all && !(skin > 0) && std::max(in_a.count, in_b.count) <= kFew && pair_count <= left()) {
+        stats.triangle_tests += pair_count;
+        uint32_t meeting = meetings_of_leaves(a.tree, in_a, b.tree, in_b, b_to_a, options.margin);
+        for (; meeting != 0; meeting &= meeting - 1) {
+            const auto i = static_cast<uint32_t>(std::countr_zero(meeting));
+            take({node_a, node_b, in_a.first + i % in_a.count, in_b.first + i / in_a.count});
+        }
+        return false;
+    }
     LeafResult first;
     const auto test = [&](TriangleRange some_a, TriangleRange some_b, float distance) {
         first = test_leaves(a.tree, some_a, b.tree, some_b, b_to_a, distance);

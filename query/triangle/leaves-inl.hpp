@@ -47,6 +47,31 @@ inline LeafResult test_leaf_pair(const TreeView& a, TriangleRange in_a, const Tr
     return result;
 }
 
+inline uint32_t meetings_of_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                                      const RelativePose& b_to_a, double distance) {
+    static_assert(kFew == kFour);
+    const LaneMarginFactors factors;
+    uint32_t out = 0;
+    any_four_pair(a, in_a, b, in_b, b_to_a, [&](const FourPair& fours, uint32_t first_a, uint32_t first_b) {
+        const LaneMargins margins = fours.margins(distance, factors);
+        for (uint32_t pair = 0; pair < fours.pairs(); pair += kLanes) {
+            const auto left = std::min<uint32_t>(fours.pairs() - pair, kLanes);
+            const LaneVerdicts verdicts =
+                test_all_lanes([&](size_t lane) { return fours.lanes_a(pair + lane); },
+                               [&](size_t lane) { return fours.lanes_b(pair + lane); }, margins, factors);
+            uint32_t meet = ~verdicts.apart & ((1u << left) - 1);
+            for (uint32_t open = meet & ~verdicts.meet; open != 0; open &= open - 1) {
+                const auto lane = static_cast<uint32_t>(std::countr_zero(open));
+                const uint32_t i = first_a + fours.in_a(pair + lane), j = first_b + fours.in_b(pair + lane);
+                if (separated(query::place(a, i), query::place(b, j, b_to_a), distance)) meet &= ~(1u << lane);
+            }
+            out |= meet << pair;
+        }
+        return false;
+    });
+    return out;
+}
+
 inline LeafDistance distance_of_leaf_pair(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                                           const RelativePose& b_to_a, NearLimit limit, glm::dvec3 normal,
                                           const LaneMarginFactors& factors) {

@@ -11,6 +11,7 @@ namespace prolate::query {
 
 HWY_EXPORT(test_rows);
 HWY_EXPORT(test_leaf_pair);
+HWY_EXPORT(meetings_of_leaf_pair);
 HWY_EXPORT(bound_rows);
 HWY_EXPORT(distance_of_leaf_pair);
 
@@ -22,6 +23,11 @@ LaneVerdicts test_lanes(const TriangleRows& a, const TriangleRows& b, const Lane
 LeafResult test_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                        const RelativePose& b_to_a, double distance, const LaneMarginFactors& factors) noexcept {
     return HWY_DYNAMIC_DISPATCH(test_leaf_pair)(a, in_a, b, in_b, b_to_a, distance, factors);
+}
+
+uint32_t meetings_of_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                            const RelativePose& b_to_a, double distance) noexcept {
+    return HWY_DYNAMIC_DISPATCH(meetings_of_leaf_pair)(a, in_a, b, in_b, b_to_a, distance);
 }
 
 TriangleBounds bound_lanes(const TriangleRows& a, const TriangleRows& b, const LaneMargins& margins,

@@ -23,6 +23,11 @@ struct LeafResult {
 LeafResult test_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
                        const RelativePose& b_to_a, double distance = 0, const LaneMarginFactors& factors = {}) noexcept;
 
+/// All such pairs of two leaves of at most kFew triangles each: bit i + in_a.count j, of A's i-th and B's j-th.
+inline constexpr uint32_t kFew = 4;
+uint32_t meetings_of_leaves(const TreeView& a, TriangleRange in_a, const TreeView& b, TriangleRange in_b,
+                            const RelativePose& b_to_a, double distance) noexcept;
+
 struct LeafDistance {
     double lower = std::numeric_limits<double>::infinity();                       // no two triangles are nearer
     TriangleDistance nearest{0, std::numeric_limits<double>::infinity(), {}, {}}; // of the nearest two that were found
