@@ -4,6 +4,8 @@
 #include "query/collide/search.hpp"
 #include "query/inside/enclosure.hpp"
 #include "query/node/scratch.hpp"
+#include "src/block_box.hpp"
+#include "src/lattice.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -17,6 +19,24 @@ namespace {
 // A lower bound on the distance of the bodies, by the slabs of their roots, where both have any.
 double gap_of_flat_roots(const TreeView& a, const TreeView& b, const query::RelativePose& b_to_a, double margin) {
     return a.raw().has_slabs() && b.raw().has_slabs() ? query::gap_of_roots(a, b, b_to_a, margin) : -HUGE_VAL;
+}
+
+// The box of a root, metres.
+struct RootBox {
+    glm::dvec3 center, half;
+};
+RootBox box_of_root(const TreeView& tree) {
+    const LatticeInfo lattice = tree.raw().lattice();
+    const BlockBoxes boxes(tree.raw().bounding_block(0));
+    const double step = step_of(lattice);
+    RootBox out;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto axis = static_cast<glm::length_t>(i);
+        const double origin = static_cast<double>(lattice.origin[i]) + boxes.origin(i), half_step = boxes.half_step(i);
+        out.center[axis] = (origin + (boxes.low(i, 0) + boxes.high(i, 0)) * half_step) * step;
+        out.half[axis] = (boxes.high(i, 0) - boxes.low(i, 0)) * half_step * step;
+    }
+    return out;
 }
 
 // ---- coherence ----
@@ -62,6 +82,25 @@ double query::gap_of_spheres(const TreeView& a, const TreeView& b, const Relativ
     const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
     return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
            kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
+}
+
+// Six of the fifteen axes of S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree: a hierarchical structure for rapid
+// interference detection", SIGGRAPH 1996.
+double query::gap_of_boxes(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
+    const RootBox box_a = box_of_root(a), box_b = box_of_root(b);
+    const glm::dmat3& to_a = b_to_a.rotation;
+    const glm::dvec3 between = to_a * box_b.center + b_to_a.translation - box_a.center, seen_by_b = between * to_a;
+    double gap = -HUGE_VAL, reach = b_to_a.distance;
+    for (glm::length_t i = 0; i < 3; ++i) {
+        double half_b = box_a.half[i], half_a = box_b.half[i]; // what both boxes take along the side of either
+        for (glm::length_t k = 0; k < 3; ++k) {
+            half_b += std::abs(to_a[k][i]) * box_b.half[k];
+            half_a += std::abs(to_a[i][k]) * box_a.half[k];
+        }
+        gap = std::max(gap, std::max(std::abs(between[i]) - half_b, std::abs(seen_by_b[i]) - half_a));
+        reach += std::abs(box_a.center[i]) + box_a.half[i] + std::abs(box_b.center[i]) + box_b.half[i];
+    }
+    return gap - kSeparationMargin * reach;
 }
 
 Verdict query::decide(CollideSearch& search) noexcept {
@@ -122,6 +161,8 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     const auto bodies = query::in_canonical_order(a, pose_a, b, pose_b);
     const query::RelativePose b_to_a = query::relative_pose(bodies.place_a, bodies.place_b);
     double gap = gap_of_spheres(bodies.a, bodies.b, b_to_a); // settles most pairs of a scene, at a fifth of the cost
+    if (!(gap > options.margin) && a.has_triangles() && b.has_triangles()) // of covers, boxes tell too little
+        gap = query::gap_of_boxes(bodies.a, bodies.b, b_to_a);
     if (!(gap > options.margin)) gap = gap_of_flat_roots(bodies.a, bodies.b, b_to_a, double{options.margin});
     if (gap > options.margin && options.max_pair_tests > 0) {
         if (cache) remember(Verdict::separated, {}, gap);

@@ -1,11 +1,12 @@
 // Tree against tree: both are descended at once, a block of eight children at a time.
 //
-// Of a pair of nodes that meet, the larger is opened: its children, up to eight of them in a block, are tested at once
-// against the other (query/node/lanes-inl.hpp), and those that are not separated from it make new pairs. Of exact
-// trees, those that nearly are get a closer look along the direction that nearly separates them: hulls of what is below
-// the nodes (query/node/hull_lanes-inl.hpp), or the triangles of two leaves (query/triangle/support.hpp). Two leaves
-// are decided at once, in double precision (leaves.cpp). Which node is opened depends on the pair alone, so max_level
-// and budgets only cut the traversal off: if level l says separated, so does every deeper one.
+// Of a pair of nodes that meet, the larger is opened, by its size times how far it reaches towards the other: its
+// children, up to eight of them in a block, are tested at once against the other (query/node/lanes-inl.hpp), and those
+// that are not separated from it make new pairs. Of exact trees, those that nearly are get a closer look along the
+// direction that nearly separates them: hulls of what is below the nodes (query/node/hull_lanes-inl.hpp), or the
+// triangles of two leaves (query/triangle/support.hpp). Two leaves are decided at once, in double precision
+// (leaves.cpp). Which node is opened depends on the pair alone, so max_level and budgets only cut the traversal off: if
+// level l says separated, so does every deeper one.
 //
 // Sound because a node's bounding volume holds all leaves below it: if B is separated from A's child i, no leaf of B
 // meets one under that child.
@@ -45,7 +46,7 @@ constexpr uint32_t kOpensB = 1, kOtherIsLeaf = 2, kInOnePlane = 4;
 
 // Nodes of which p / (a + b) is greater may well be separated along n by their hulls, or triangles; below, a closer
 // look costs more than it saves.
-constexpr float kNearlySeparated = 0.88f, kLeavesNearlySeparated = 0.75f;
+constexpr float kNearlySeparated = 0.76f, kLeavesNearlySeparated = 0.75f;
 
 // kSifts: search.sift is not null, and the margin may be 0 though kMargin is set.
 template <bool kMargin, bool kSifts> class CollideTraversal {
@@ -77,6 +78,7 @@ private:
     }
     // What is on the stack.
     Verdict descend() {
+        left_ = budget();
         while (size_ > 0) {
             auto e = stack_[--size_];
             if (kSifts && s_.sift(s_.sift_user, &e, &e + 1) == &e) continue;
@@ -88,8 +90,9 @@ private:
                 continue;
             }
             const ChildRange children = children_in(side.block(node), node % kBlockLanes);
-            if (children.count > budget()) return Verdict::undecided;
-            pair_tests_ += children.count; // also those that it may not come to
+            if (kSifts) left_ = budget();
+            if (children.count > left_) return Verdict::undecided;
+            pair_tests_ += children.count, left_ -= children.count; // also those that it may not come to
             if (children.count <= kBlockLanes ? test(open, children.first, children.count, other, e.flags)
                                               : test_all(open, children, other, e.flags))
                 return stopped();
@@ -126,17 +129,26 @@ private:
         return hull_of(side.hulls, block, at);
     }
 
-    // Are the hulls of a lane's node and of the other tree's node separated along n?
-    HWY_NOINLINE bool hulls_separated(uint32_t open, uint32_t node, uint32_t other, const Kept& kept, uint32_t lane) {
-        const std::byte *const of_other = hull_at(sides_[open ^ kOpensB], other), *const own =
-                                                                                      hull_at(sides_[open], node);
-        const auto reach = [](const std::byte* hull, float x, float y, float z, float width) {
-            return hull != nullptr ? hull_reach(hull, x, y, z, width) : width;
-        };
-        const float a = kept.a[lane], b = kept.b[lane];
-        const float reach_a = reach(of_other, kept.in_a[0][lane], kept.in_a[1][lane], kept.in_a[2][lane], a);
-        const float reach_b = reach(own, -kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
-        return kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0;
+    // Those of the lanes whose hulls and that of the other tree's node are separated along n. Of the rest, kept.depth
+    // becomes what the hulls say.
+    HWY_NOINLINE uint32_t separated_by_hulls(uint32_t open, uint32_t first, uint32_t lanes, uint32_t leaves,
+                                             uint32_t other, Kept& kept) {
+        const Side& side = sides_[open];
+        const std::byte* const block = side.block(first);
+        const HullRows hull_a = load_hull(hull_at(sides_[open ^ kOpensB], other));
+        uint32_t out = 0;
+        for (; lanes != 0; lanes &= lanes - 1) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(lanes));
+            const HullRows hull_b = load_hull((leaves >> lane & 1) != 0 ? nullptr : hull_of(side.hulls, block, lane));
+            const float a = kept.a[lane], b = kept.b[lane];
+            const float reach_a = hull_a.reach(kept.in_a[0][lane], kept.in_a[1][lane], kept.in_a[2][lane], a);
+            const float reach_b = hull_b.reach(-kept.in_b[0][lane], -kept.in_b[1][lane], -kept.in_b[2][lane], b);
+            if (kept.gap[lane] + ((a - reach_a) + (b - reach_b)) > 0)
+                out |= 1u << lane;
+            else
+                kept.depth[lane] *= (a + b) / (reach_a + reach_b);
+        }
+        return out;
     }
     // Once there are more pairs than usual: much is equally near.
     bool slabs_pay() const { return have_slabs_ && block_tests_ > kPatience; }
@@ -196,13 +208,14 @@ private:
         const float lattice_margin = kMargin ? margin_in(side) : 0.0f;
         uint32_t meet = boxes_meet(block, single, lattice_margin) & ((1u << count) - 1);
         if (meet == 0) return false;
-        uint32_t met = 0, larger = 0;
+        uint32_t met = 0, larger = 0, near = 0;
         Kept kept;
         const Float margin = set(lattice_margin);
         for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
             const LaneTerms t = evaluate(nodes(i), single);
             met |= bits(!separated<kMargin>(t, margin)) << i;
-            larger |= bits(t.size > single.size) << i;
+            larger |= bits(t.b * t.size > t.a * single.size) << i;
+            near |= bits(t.p > kNearlySeparated * t.sum) << i;
             kept.keep(t, i);
             if (have_hulls_) kept.keep_for_hulls(t, margin, i);
         }
@@ -212,24 +225,29 @@ private:
         const uint32_t leaves = side.leaf_lanes(first, block);
         if (other_is_leaf != 0 && (meet & leaves) != 0) {
             if (decide(open, first, meet & leaves, other, kept, inherited)) return true;
+            left_ = budget();
             meet &= ~leaves;
         }
         const uint32_t opened = ~leaves & (other_is_leaf != 0 ? 0xff : larger);
         const uint32_t if_opened = open | other_is_leaf | inherited, if_other_opened = (open ^ kOpensB) | inherited;
         const uint32_t before = size_;
-        uint32_t deepest = before;
-        float least = HUGE_VALF;
-        for (; meet != 0; meet &= meet - 1) {
-            const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
+        if (have_hulls_ && (meet & near) != 0)
+            meet &= ~separated_by_hulls(open, first, meet & near, leaves, other, kept);
+        if (meet == 0) return false;
+        const auto push = [&](uint32_t lane) {
             const uint32_t node = first + lane;
-            if (have_hulls_ && kept.depth[lane] > kNearlySeparated && hulls_separated(open, node, other, kept, lane))
-                continue;
             const uint32_t flags =
                 (opened >> lane & 1) != 0 ? if_opened : if_other_opened | (leaves >> lane & 1) * kOtherIsLeaf;
-            if (kept.depth[lane] < least) least = kept.depth[lane], deepest = size_;
             stack_[size_++] = {open != 0 ? other : node, open != 0 ? node : other, kept.depth[lane], flags};
+        };
+        auto deepest = static_cast<uint32_t>(std::countr_zero(meet));
+        while ((meet &= meet - 1) != 0) {
+            const auto lane = static_cast<uint32_t>(std::countr_zero(meet));
+            const bool deeper = kept.depth[lane] < kept.depth[deepest];
+            push(deeper ? deepest : lane);
+            deepest = deeper ? lane : deepest;
         }
-        if (deepest < size_) std::swap(stack_[deepest], stack_[size_ - 1]);
+        push(deepest);
         if (slabs_pay() && (of_parent & kInOnePlane) == 0) sift_by_slabs(before, open, kept);
         if (kSifts) size_ = static_cast<uint32_t>(s_.sift(s_.sift_user, stack_ + before, stack_ + size_) - stack_);
         return false;
@@ -271,11 +289,14 @@ private:
         const std::byte* const block = sides_[1].block(in_b.first);
         place_block(block, b_to_a_, placed);
         const uint32_t leaves = sides_[1].leaf_lanes(in_b.first, block);
-        sides_[1].deepest = in_b.first + in_b.count - 1;
         pair_tests_ = in_b.count, block_tests_ = 1;
         const auto nodes = [&](size_t i) -> const LaneNodes& { return nodes_a[i / kFloatLanes]; };
         alignas(64) float far[kBlockLanes];
-        for (uint32_t near = near_root(placed, (1u << in_b.count) - 1, far); near != 0;) {
+        uint32_t near = near_root(placed, (1u << in_b.count) - 1, far);
+        if (std::min(sides_[0].limit_from, sides_[1].limit_from) == 0) // as little as what deeper searches begin with
+            return near != 0 && s_.take({0, 0, kNoTriangle, kNoTriangle}) ? Verdict::overlapping : Verdict::separated;
+        sides_[1].deepest = in_b.first + in_b.count - 1;
+        while (near != 0) {
             auto lane = static_cast<uint32_t>(std::countr_zero(near));
             for (uint32_t rest = near & (near - 1); rest != 0; rest &= rest - 1)
                 if (const auto next = static_cast<uint32_t>(std::countr_zero(rest)); far[next] < far[lane]) lane = next;
@@ -293,8 +314,7 @@ private:
     // The children of a root, if they are a block.
     static ChildRange one_block(const Side& side) {
         const ChildRange children = children_in(side.block(0), 0);
-        return side.limit_from > 0 && side.leaves_from > 0 && children.count <= kBlockLanes ? children
-                                                                                            : ChildRange{0, 0};
+        return side.leaves_from > 0 && children.count <= kBlockLanes ? children : ChildRange{0, 0};
     }
     // B's lanes, as bits, that boxes do not separate from A's root, and `far` off its center, by spheres. Says, too,
     // whether one body may hold the other: not if all that there is of B lies on one side of A.
@@ -342,7 +362,7 @@ private:
     CollideSearch& s_;
     Scratch::Entry* const stack_;
     uint32_t size_ = 0;
-    uint64_t pair_tests_ = 0, block_tests_ = 0;
+    uint64_t pair_tests_ = 0, block_tests_ = 0, left_ = 0; // left_: of the budget, for nodes
     const bool have_hulls_ = s_.a.tree.has_triangles() || s_.b.tree.has_triangles();
     const bool have_slabs_ = s_.a.has_slabs || s_.b.has_slabs;
     const LatticePose b_to_a_;

@@ -79,6 +79,8 @@ private:
 
 /// The bodies are certainly so far apart, metres, by spheres around their roots; NaN if the pose is not finite.
 double gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept;
+/// The same by the boxes of their roots, along the sides of these.
+double gap_of_boxes(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept;
 /// Does the pair that a cache names exist?
 bool names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b) noexcept;
 /// The traversal alone: separated, overlapping (what max_level lets stand for leaves), or undecided (out of budget).

@@ -26,19 +26,39 @@
 HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
-/// How far what a hull record (src/hull.hpp) describes reaches from its node's center along n: v = {x, y, z} = L^T n,
-/// width = |v|. If the record knows nothing, `width`.
-HWY_INLINE float hull_reach(const std::byte* hull, float x, float y, float z, float width) {
-    const float along[3] = {x, y, z};
-    const Float3 v = set(along);
-    Float most = set(-HUGE_VALF);
-    for (size_t i = 0; i < kHullPoints; i += kFloatLanes) {
-        const auto row = [&](size_t k) { return load_integers<int8_t>(hull + kHullPoint + kHullPoints * k + i); };
-        most = max(most, dot(Float3{row(0), row(1), row(2)}, v));
+/// A hull record (src/hull.hpp), or none.
+struct HullRows {
+    Float3 points[kHullPoints / kFloatLanes];
+    float share; ///< 0: nothing is known
+
+    /// How far what it describes reaches from its node's center along n: v = {x, y, z} = L^T n, width = |v|. If nothing
+    /// is known, `width`.
+    HWY_INLINE float reach(float x, float y, float z, float width) const {
+        const Float3 v{set(x), set(y), set(z)};
+        Float most = dot(points[0], v);
+        for (size_t i = 1; i < kHullPoints / kFloatLanes; ++i) most = max(most, dot(points[i], v));
+        const float reach =
+            hn::GetLane(hn::MaxOfLanes(FloatTag(), most)) * kPerHullUnit + share * kPerHullShare * width;
+        return share > 0 ? reach : width;
     }
-    const auto share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
-    const float reach = hn::GetLane(hn::MaxOfLanes(FloatTag(), most)) * kPerHullUnit + share * kPerHullShare * width;
-    return share > 0 ? reach : width;
+};
+/// `hull` may be null.
+HWY_INLINE HullRows load_hull(const std::byte* hull) {
+    HullRows out{};
+    if (hull == nullptr) return out;
+    for (size_t i = 0; i < kHullPoints / kFloatLanes; ++i) {
+        const auto row = [&](size_t k) {
+            return load_integers<int8_t>(hull + kHullPoint + kHullPoints * k + kFloatLanes * i);
+        };
+        out.points[i] = {row(0), row(1), row(2)};
+    }
+    out.share = static_cast<float>(load_le<uint8_t>(hull + kHullShare));
+    return out;
+}
+
+/// The reach of a record.
+HWY_INLINE float hull_reach(const std::byte* hull, float x, float y, float z, float width) {
+    return load_hull(hull).reach(x, y, z, width);
 }
 
 } // namespace prolate::query::HWY_NAMESPACE

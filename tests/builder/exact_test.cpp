@@ -1,5 +1,6 @@
 // Exact trees: every triangle in its place, the proof, and queries against brute force over all pairs of triangles.
 #include "builder/random.hpp"
+#include "query/collide/search.hpp"
 #include "query/triangle/separation.hpp"
 #include "src/block.hpp"
 #include "src/bytes.hpp"
@@ -993,6 +994,29 @@ TEST(ExactQuery, ABudgetIsExactAndDeeperNeverRevokesSeparated) {
 }
 
 // ---- boxes ----
+
+TEST(ExactQuery, BoxesOfRootsAreNotFartherApartThanWhatTheyHold) {
+    const auto all = bodies();
+    scenes::Random random(31);
+    QueryContext context;
+    uint32_t apart = 0, tight = 0;
+    for (const Body& a : all)
+        for (const Body& b : all)
+            for (int i = 0; i < 40; ++i) {
+                Query q = at(between(random), random.in(0.3, 2));
+                if (i % 2 == 0) q.a.rotation = q.b.rotation = {}; // axes and flats are parallel
+                const TreeView ta = *a.built.tree.view().scaled(i % 3 == 0 ? 3.0f : 1.0f), tb = b.built.tree.view();
+                const double gap = query::gap_of_boxes(ta, tb, query::relative_pose(q.a, q.b));
+                const double distance = prolate::distance(ta, q.a, tb, q.b, context).upper;
+                ASSERT_LE(gap, distance);
+                apart += gap > 0, tight += gap > 0.99 * distance && gap > 0;
+                if (gap > 0) {
+                    ASSERT_EQ(collide(ta, q.a, tb, q.b, context).verdict, Verdict::separated);
+                }
+            }
+    EXPECT_GT(apart, 100u);
+    EXPECT_GT(tight, 10u);
+}
 
 // How much longer than the least one a side of the body's box is, at most; below 0 if it does not hold the body.
 double longer_than_need_be(const TreeView& tree, const Pose& pose) {
