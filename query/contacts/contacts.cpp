@@ -63,14 +63,15 @@ public:
           pairs_(search, bodies_), candidates_{last, exchanged}, one_way_(bodies_, candidates_, ways_[0], points_[0]),
           patches_(kSamePoint * size_),
           of_ellipsoids_(!search.a.tree.has_triangles() && !search.b.tree.has_triangles()) {
-        if (!bodies_.closed_a || !bodies_.closed_b) phase_ = Phase::normals;
+        const bool limited = search.a.limit_from != UINT32_MAX || search.b.limit_from != UINT32_MAX;
+        if (!bodies_.closed_a || !bodies_.closed_b || limited) phase_ = Phase::normals;
         for (uint32_t i = 0; i < last.count(); ++i) patches_.expect(last.normal(i));
         search.each = [](void* self, const MeetingPair& pair) {
             auto* const collector = static_cast<Collector*>(self);
             collector->add(pair, collector->search_.found);
         };
         search.each_user = this;
-        if (search.a.limit_from != UINT32_MAX || search.b.limit_from != UINT32_MAX) return; // nodes stand for triangles
+        if (limited) return; // nodes stand for triangles
         search.sift = [](void* self, Scratch::Entry* begin, Scratch::Entry* end) {
             return static_cast<Collector*>(self)->sift(begin, end);
         };

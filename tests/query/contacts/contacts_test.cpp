@@ -600,6 +600,27 @@ TEST(Contacts, ABudgetBoundsTriangleTestsToo) {
     }
 }
 
+// Of these trees some leaves lie above the last level: among the nodes that meet are some with triangles, and others.
+TEST(Contacts, ALevelMayCutWhereSomeNodesAreLeaves) {
+    const scenes::ExactScene scene =
+        scenes::exact_tree(shapes::torus(1, 0.3f, 37, 17), {.degree = 5, .leaf_triangles = 2});
+    const TreeView torus = *TreeView::open(scene.bytes);
+    Random random(11);
+    const auto context = std::make_unique<QueryContext>();
+    uint64_t most = 0;
+    for (int i = 0; i < 200; ++i) {
+        const Pose pose = scenes::pose_at(random, random.in(0, 1));
+        for (uint32_t level = 0; level < torus.level_count(); ++level) {
+            ContactManifolds m;
+            const ContactResult r = contacts(torus, {}, torus, pose, m, *context, {.max_level = level});
+            EXPECT_EQ(r.verdict, collide(torus, {}, torus, pose, *context, {.max_level = level}).verdict);
+            EXPECT_EQ(m.count > 0, r.found > 0);
+            most = std::max(most, r.found);
+        }
+    }
+    EXPECT_GT(most, query::kMany);
+}
+
 TEST(Contacts, ACubeOnItsCorner) {
     const Solid floor = exact(shapes::moved(shapes::sheet(2, 2, 1), {-1, -1, 0}), false), cube = unit_box();
     const ContactManifolds m = fresh(floor, {}, cube, {{-0.3466f, 0.3485f, 0.7101f}, {-0.1f, 0, -0.4f, -0.4f}});
