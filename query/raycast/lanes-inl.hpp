@@ -25,9 +25,9 @@
 // Boxes: the slabs between their sides (Kay and Kajiya 1986). In lattice coordinates a side, b_i + q, is exact, b_i
 // where the block's box coordinates begin, and is moved outwards by m + kLaneMargin (|o|_1 + |E|_1 + |c| + |b_i - o_i|)
 // + 2^-42 reach. Of s = q / E_i + (b_i - o_i) / E_i, that costs, times |E_i|: u |o_i| for the rounded origin, 3 u |b_i
-// - o_i| for the second term, u |q| <= u (|b_i - o_i| + s |E_i|) for the first, and 4 u s |E_i| for the rounded span,
-// its inverse and the sum: at s <= 1 a fraction of that margin, and beyond it s stays above 1. Nothing here is a NaN:
-// lattice_ray() sees to it that the ray is finite.
+// - o_i| for the second term, u |q| <= u (|b_i - o_i| + s |E_i|) for the first, 4 u s |E_i| for the rounded span, its
+// inverse and the sums, and 4 u of itself for the margin: at s <= 1 a fraction of that margin, and beyond it s stays
+// above 1. Nothing here is a NaN: place_in_lattice() sees to it that the ray is finite.
 //
 // Cost: about 60 vector operations for the boxes, and 110 with 6 divisions and 2 square roots for the ellipsoids.
 #include "query/inside/axis_lanes-inl.hpp"
@@ -69,7 +69,6 @@ HWY_INLINE void place_in_lattice(const double (&origin)[4], const double (&span)
         const auto backward = hn::RebindMask(i32, inverse < hn::Zero(f));
         const auto low = hn::Set(i32, int32_t{kBlockBoxLow}), high = hn::Set(i32, int32_t{kBlockBoxHigh});
         hn::Store(o, f, out.origin + at), hn::Store(e, f, out.span + at), hn::Store(inverse, f, out.inverse + at);
-        hn::Store(hn::CopySign(hn::Set(f, 1), inverse), f, out.forward + at);
         hn::Store(hn::IfThenElse(backward, high, low), i32, out.near_side + at);
         hn::Store(hn::IfThenElse(backward, low, high), i32, out.far_side + at);
         hn::Store(hn::Abs(o) + hn::Abs(e), f, lengths + at);
@@ -77,9 +76,14 @@ HWY_INLINE void place_in_lattice(const double (&origin)[4], const double (&span)
     out.thickness = static_cast<float>(thickness * kRoundThicknessUp);
     out.slack =
         kLaneMargin * (kLargestCenter + lengths[0] + lengths[1] + lengths[2]) + static_cast<float>(0x1p-42 * reach);
-    if (out.thickness + out.slack < kMostSlack) return;
-    for (size_t i = 0; i < 4; ++i) out.origin[i] = out.span[i] = out.inverse[i] = 0, out.forward[i] = 1;
-    out.thickness = 0, out.slack = std::numeric_limits<float>::max();
+    if (!(out.thickness + out.slack < kMostSlack)) {
+        for (size_t i = 0; i < 4; ++i) out.origin[i] = out.span[i] = out.inverse[i] = out.margin[i] = 0;
+        out.thickness = 0, out.slack = std::numeric_limits<float>::max();
+        return;
+    }
+    const auto certain = hn::Set(f, out.thickness + out.slack);
+    for (size_t at = 0; at < 4; at += hn::MaxLanes(f))
+        hn::Store(certain * hn::Abs(hn::Load(f, out.inverse + at)), f, out.margin + at);
 }
 
 /// A ray as a block's boxes see it: it passes the side of a box at x box steps where s = x per_step + near, or + far
@@ -89,7 +93,6 @@ struct BoxRay {
 };
 HWY_INLINE BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
     using IntegerTag = hn::RebindToSigned<QuadTag>;
-    const Quad certain = broadcast<Quad>(ray.thickness + ray.slack);
     BoxRay out;
     for (size_t at = 0; at < 4; at += kQuadLanes) {
         const Quad from = hn::ConvertTo(QuadTag(), load_stored<int32_t>(QuadTag(), block + kBlockBoxOrigin + 4 * at)),
@@ -97,9 +100,9 @@ HWY_INLINE BoxRay box_ray(const std::byte* block, const LatticeRay& ray) {
         const auto exponent =
             hn::PromoteTo(IntegerTag(), load_stored<uint8_t>(QuadTag(), block + kBlockBoxExponent + at));
         const Quad step = hn::BitCast(QuadTag(), hn::ShiftLeft<23>(exponent + hn::Set(IntegerTag(), 127)));
-        const Quad wider = load<Quad>(ray.forward + at) * (certain + kLaneMargin * abs(begins));
-        store((begins - wider) * inverse, out.near + at);
-        store((begins + wider) * inverse, out.far + at);
+        const Quad parameter = begins * inverse, margin = load<Quad>(ray.margin + at) + kLaneMargin * abs(parameter);
+        store(parameter - margin, out.near + at);
+        store(parameter + margin, out.far + at);
         store(inverse * step, out.per_step + at);
     }
     return out;

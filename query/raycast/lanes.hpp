@@ -18,7 +18,7 @@ struct LatticeRay {
     alignas(16) float origin[4], span[4];
     /// 1 / span; of a span that is (nearly) 0, one of the same sign that moves less than rounding.
     alignas(16) float inverse[4];
-    alignas(16) float forward[4]; ///< 1, or -1 where the ray runs against the axis
+    alignas(16) float margin[4]; ///< (thickness + slack) / |span|: in the ray's parameter, what no block adds to
     alignas(16) int32_t near_side[4],
         far_side[4]; ///< of a block's boxes, where it enters and leaves: kBlockBoxLow, -High
     float thickness; ///< nodes that come as near to the ray as this are met, too; 0, or rounded up

@@ -150,12 +150,15 @@ RayShear shear_to_axis(const dvec3& d) {
 } // namespace
 
 PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllipsoid& bound, double distance) noexcept {
-    const dvec3 origin = to_frame.translation;
-    const dvec3 direction = to_frame.rotation * to_double(ray.direction);
+    return place(ray, to_frame.rotation, to_frame.translation, to_frame.distance, bound, distance);
+}
+
+PlacedRay place(const Ray& ray, const dmat3& rotation, const dvec3& origin, double far, const PlacedEllipsoid& bound,
+                double distance) noexcept {
+    const dvec3 direction = rotation * to_double(ray.direction);
     const double speed = glm::length(direction);
     // Whatever is met lies in the ball around the bound, or near it, so |t - middle| speed is at most its radius.
-    const double reach = to_frame.distance + bound.reach + distance,
-                 radius = bound.size + distance + kSeparationMargin * reach;
+    const double reach = far + bound.reach + distance, radius = bound.size + distance + kSeparationMargin * reach;
     const double middle = glm::dot(bound.center - origin, direction) / (speed * speed), half = radius / speed;
     const double begin = std::max(0.0, middle - half), end = std::min(double{ray.max_t}, middle + half);
     PlacedRay out{};

@@ -34,6 +34,7 @@
 
 #include <prolate/raycast.hpp>
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include <optional>
@@ -63,6 +64,10 @@ struct PlacedRay {
 /// may come as near to `bound` as `distance`.
 PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllipsoid& bound,
                 double distance = 0) noexcept;
+/// The same, `to_frame` in its parts: `rotation`, and in the tree's frame the ray's `origin`, `far` from where it
+/// begins.
+PlacedRay place(const Ray& ray, const glm::dmat3& rotation, const glm::dvec3& origin, double far,
+                const PlacedEllipsoid& bound, double distance) noexcept;
 
 struct RayHit {
     double t;          ///< of the placed ray

@@ -35,7 +35,7 @@ PlacedEllipsoid root_of(const TreeView& tree, const float* growth) {
 
 PlacedRay place_ray(const RaycastBody& body, const Ray& ray) {
     const glm::dvec3 from_body = to_double(ray.origin) - body.translation;
-    return place(ray, {body.rotation, body.rotation * from_body, glm::length(from_body)}, body.root,
+    return place(ray, body.rotation, body.rotation * from_body, glm::length(from_body), body.root,
                  double{body.options.margin});
 }
 
@@ -45,11 +45,7 @@ RaycastBody::RaycastBody(const TreeView& tree, const Pose& pose, Scratch scratch
                          const float* grown) noexcept
     : side(tree_side(tree, asked.max_level)), options(for_rays(tree, asked)), growth(grown),
       stacks(suffices(scratch, tree) ? reinterpret_cast<RayFamily*>(scratch.entries()) : nullptr),
-      stack_size(ray_stack_size(tree)),
-      rays_at_once(std::min(
-          static_cast<uint32_t>(size_t{scratch.count()} * sizeof(Scratch::Entry) / (stack_size * sizeof(RayFamily))),
-          kRaysAtOnce)),
-      root(root_of(tree, grown)), translation(to_double(pose.translation)),
+      stack_size(ray_stack_size(tree)), root(root_of(tree, grown)), translation(to_double(pose.translation)),
       rotation(glm::transpose(rotation_matrix(pose.rotation))), per_step(steps_per_metre(side.lattice)) {
     for (size_t i = 0; i < 3; ++i) shift[i] = side.lattice.origin[i], shift_reach += std::abs(shift[i]);
 }
@@ -95,7 +91,7 @@ void complete(const query::RaycastSearch& search, const Ray& ray, RaycastResult&
     out.clear = search.ray.begin + std::max(0.0, clear);
 }
 
-// No more rays than that, or than the body takes at once.
+// No more rays than that, or than there are stacks for.
 template <size_t kMost>
 void cast_some(const query::RaycastBody& body, std::span<const Ray> rays, std::span<RaycastResult> out, bool any) {
     using query::RaycastSearch;
@@ -134,8 +130,11 @@ void raycast(const TreeView& tree, const Pose& pose, std::span<const Ray> rays, 
     const query::RaycastBody body(tree, pose, context, options, nullptr);
     const size_t count = std::min(rays.size(), out.size());
     if (!body.stacks) std::fill_n(out.begin(), count, RaycastResult{});
-    for (size_t i = 0; body.stacks && i < count; i += body.rays_at_once) {
-        const size_t some = std::min<size_t>(count - i, body.rays_at_once);
+    const size_t stacks =
+                     size_t{context.count()} * sizeof(Scratch::Entry) / (body.stack_size * sizeof(query::RayFamily)),
+                 at_once = std::min<size_t>(stacks, query::kRaysAtOnce);
+    for (size_t i = 0; body.stacks && i < count; i += at_once) {
+        const size_t some = std::min(count - i, at_once);
         cast_some<query::kRaysAtOnce>(body, rays.subspan(i, some), out.subspan(i, some), false);
     }
 }

@@ -33,11 +33,10 @@ inline uint32_t ray_stack_size(const TreeView& tree) noexcept {
 /// A tree at a pose: what many rays have in common.
 struct RaycastBody {
     const TreeSide side;
-    const QueryOptions options;  // sound
-    const float* const growth;   ///< of raycast_cut(): by slots; else null
-    RayFamily* const stacks;     ///< null if the scratch is too small
-    const uint32_t stack_size;   ///< of each
-    const uint32_t rays_at_once; ///< stacks
+    const QueryOptions options; // sound
+    const float* const growth;  ///< of raycast_cut(): by slots; else null
+    RayFamily* const stacks;    ///< null if the scratch is too small
+    const uint32_t stack_size;  ///< of each
     const PlacedEllipsoid root;
     const glm::dvec3 translation;
     const glm::dmat3 rotation;             ///< from the world to the body
@@ -69,8 +68,8 @@ struct RaycastSearch {
     void meet_triangle(uint32_t leaf, uint32_t triangle) noexcept;
 };
 
-/// The traversal: finds the first hit of each, or any. Of rays that are valid and not empty, all against one body and
-/// no more than body.rays_at_once.
+/// The traversal: finds the first hit of each, or any. Of rays that are valid and not empty, all against one body,
+/// which has a stack for each, and no more than kRaysAtOnce.
 void traverse(std::span<RaycastSearch> searches) noexcept;
 
 } // namespace prolate::query

@@ -110,10 +110,10 @@ float box_entry(const std::byte* block, uint32_t lane, const LatticeRay& ray, fl
         };
         const float inverse = ray.inverse[i], per_step = inverse * boxes.step(i);
         const float begins = static_cast<float>(boxes.origin(i)) - ray.origin[i];
-        const float margin = (ray.thickness + ray.slack) + kLaneMargin * std::abs(begins);
+        const float parameter = begins * inverse;
+        const float margin = (ray.thickness + ray.slack) * std::abs(inverse) + kLaneMargin * std::abs(parameter);
         const bool forward = !(inverse < 0);
-        const float near = (forward ? begins - margin : begins + margin) * inverse;
-        const float far = (forward ? begins + margin : begins - margin) * inverse;
+        const float near = parameter - margin, far = parameter + margin;
         const float in = side(forward ? kBlockBoxLow : kBlockBoxHigh) * per_step + near;
         const float out = side(forward ? kBlockBoxHigh : kBlockBoxLow) * per_step + far;
         if (in > enter) enter = in;

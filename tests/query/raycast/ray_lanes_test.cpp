@@ -125,6 +125,7 @@ LatticeRay place(const Grazing& g, const LatticeInfo& lattice, double slack_fact
     LatticeRay ray;
     HWY_DYNAMIC_DISPATCH(placed_ray)(origin, span, reach, thickness * per_step, ray);
     ray.slack *= static_cast<float>(slack_factor);
+    for (size_t i = 0; i < 3; ++i) ray.margin[i] = (ray.thickness + ray.slack) * std::abs(ray.inverse[i]);
     return ray;
 }
 
