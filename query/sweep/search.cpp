@@ -6,6 +6,9 @@
 // controlled conservative advancement for continuous collision detection of polygonal models" (2009), advance whole
 // bodies by the least of all pairs instead, and start from the roots again at each step.
 //
+// The gap of two nodes of exact trees is that of their boxes and hulls along the direction that their ellipsoids have;
+// how fast it closes is said by the ellipsoids, which hold all of what moves.
+//
 // A pair of nodes has a certified time until which what lies below them keeps apart: that at which it was looked at,
 // and what its gap, along a direction found then, takes to close. The earliest pair is looked at again, at its own
 // time: opened (its larger node, as collide() does), so that its children have times of their own; or, of two leaves,
@@ -71,7 +74,8 @@ struct ByTime {
     }
 };
 
-class SweepTraversal {
+// kHulls: of exact trees, one at least. Boxes and hulls are worth their price there.
+template <bool kHulls> class SweepTraversal {
     using Entry = Scratch::Entry;
 
 public:
@@ -163,22 +167,37 @@ private:
         const MotionFrame& frame = kB ? s_.frame_b : s_.frame_a;
         const std::byte* const block = side.block(first);
         const int32_t exponent = side.lattice.step_exponent;
-        const Single one = place_here(other.block(node), node % kBlockLanes, frame.y_to_x);
+        PlacedBox box;
+        PlacedBox* const used = kHulls ? &box : nullptr;
+        const Single one = place_here(other.block(node), node % kBlockLanes, frame.y_to_x, used);
         LaneSpeeds speeds;
-        bound_lanes(block, exponent, one, out.bounds);
+        bound_lanes(block, exponent, one, used, std::numeric_limits<double>::infinity(), out.bounds);
         speed_lanes(block, exponent, one, frame, out.bounds, speeds);
         out.one_size = one.size;
         s_.stats.pair_tests += end - begin, ++s_.stats.block_tests;
         side.deepest = std::max(side.deepest, first + end - 1);
         const double target = s_.target * steps_per_metre(side.lattice);
+        const std::byte* const hull_one = kHulls ? inner_hull(other, node) : nullptr;
         for (uint32_t i = begin; i < end; ++i) {
             const double lengths = one.reach + one.size + double{kLargestCenter} + out.bounds.size[i];
-            out.gap[i] = out.bounds.lower[i] - target - s_.now.slack * lengths;
-            out.time[i] = s_.time;
-            if (out.gap[i] > 0)
-                out.time[i] +=
-                    s_.overshoot * closing_time(out.gap[i], speeds.rate[i], speeds.curve[i], speeds.most_rate[i]);
+            const auto note = [&](double lower) {
+                out.gap[i] = lower - target - s_.now.slack * lengths;
+                out.time[i] = s_.time;
+                if (out.gap[i] > 0)
+                    out.time[i] +=
+                        s_.overshoot * closing_time(out.gap[i], speeds.rate[i], speeds.curve[i], speeds.most_rate[i]);
+            };
+            note(out.bounds.lower[i]);
+            if (kHulls && out.time[i] < s_.horizon)
+                note(out.bounds.lower[i] + hulls_add(out.bounds, i, one.size, hull_one, inner_hull(side, first + i)));
         }
+    }
+    // The hull of an inner node of an exact tree; null of others.
+    static const std::byte* inner_hull(const TreeSide& side, uint32_t node) {
+        const uint32_t lane = node % kBlockLanes;
+        const std::byte* const block = side.block(node);
+        const bool leaf = (side.leaf_lanes(node - lane, block) >> lane & 1) != 0;
+        return leaf ? nullptr : hull_of(side.hulls, block, lane);
     }
 
     template <bool kB> bool open(const Entry& e) {
@@ -247,7 +266,10 @@ private:
 };
 
 void traverse_target(SweepSearch& search) {
-    SweepTraversal(search).run();
+    if (search.a.hulls != nullptr || search.b.hulls != nullptr)
+        SweepTraversal<true>(search).run();
+    else
+        SweepTraversal<false>(search).run();
 }
 
 } // namespace

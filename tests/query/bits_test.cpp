@@ -288,7 +288,7 @@ TEST(Bits, Deformed) {
 }
 
 TEST(Bits, Sweep) {
-    expect_bits(16882116511383713749u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(1940080605202444642u, [](Bits& bits, const Scenes::Pair& p) {
         const Vec3 from = p.pose_b.translation, to = p.pose_a.translation;
         const Motion a{p.pose_a, {}, {0.3f, -1, 0.2f}, {}};
         const Motion b{p.pose_b, {to.x - from.x, to.y - from.y, to.z - from.z}, {1, 2, -0.5f}, {}};
