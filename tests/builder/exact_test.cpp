@@ -843,6 +843,53 @@ TEST(ExactQuery, DistanceBoundsHoldTheTruth) {
     EXPECT_GT(meeting, 100u);
 }
 
+// Of bodies with many hulls, apart and on their way to each other.
+TEST(ExactQuery, DistancesAndSweepsOfFineBodiesAgreeWithCollisions) {
+    scenes::Random random(4);
+    const auto dented = [&](Mesh mesh) {
+        for (Vec3& v : mesh.vertices) {
+            const auto scale = static_cast<float>(random.in(0.95, 1));
+            v = {scale * v.x, scale * v.y, scale * v.z};
+        }
+        return must_build(mesh);
+    };
+    const Build zoo[] = {dented(shapes::icosphere(3)), dented(shapes::torus(1, 0.3f, 40, 20)),
+                         dented(shapes::torus(1, 0.05f, 60, 6))};
+    const auto vec = [](const Point& d, double length) {
+        return scenes::to_float({length * d[0], length * d[1], length * d[2]});
+    };
+    QueryContext context;
+    int hits = 0;
+    for (int i = 0; i < 300; ++i) {
+        const TreeView a = zoo[random.below(3)].tree.view(), b = zoo[random.below(3)].tree.view();
+        const Motion still{{{}, random.rotation()}, {}, {}, {}};
+        const Point from = random.direction(), aside = random.direction();
+        const double away = random.in(1.5, 4), way = away * random.in(0.5, 2);
+        const Motion moving{{vec(from, away), random.rotation()},
+                            vec({0.2 * aside[0] - from[0], 0.2 * aside[1] - from[1], 0.2 * aside[2] - from[2]}, way),
+                            vec(random.direction(), random.in(0, 3)),
+                            {}};
+        const DistanceResult d = distance(a, still.start, b, moving.start, context);
+        const auto meet_within = [&](double margin) {
+            const QueryOptions options{.margin = static_cast<float>(margin)};
+            return collide(a, still.start, b, moving.start, context, options).verdict;
+        };
+        if (d.lower > 0) {
+            EXPECT_EQ(meet_within(d.lower * (1 - 1e-6)), Verdict::separated);
+            EXPECT_EQ(meet_within(d.upper * (1 + 1e-6)), Verdict::overlapping);
+        }
+        const SweepResult r = sweep(a, still, b, moving, context);
+        EXPECT_NE(r.verdict, Verdict::undecided);
+        hits += r.verdict == Verdict::overlapping && r.time_upper > 0;
+        for (int k = 1; k < 16 && r.time_lower > 0; ++k) {
+            const double t = r.time_lower * (1 - std::ldexp(1.0, -k));
+            EXPECT_EQ(collide(a, still.start, b, pose_at(moving, t), context).verdict, Verdict::separated)
+                << i << ' ' << t;
+        }
+    }
+    EXPECT_GT(hits, 100);
+}
+
 TEST(ExactQuery, AllPairsAreFoundAndCounted) {
     const auto all = bodies();
     scenes::Random random(11);
