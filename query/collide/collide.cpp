@@ -41,9 +41,11 @@ RootBox box_of_root(const TreeView& tree) {
 
 // ---- coherence ----
 
-// Of the smaller root: the first skin, and the thinnest and the thickest of those that follow, each as thick as the
-// last motion: a thicker one costs more near contact than the queries that it spares (./run solids, "moving").
-constexpr double kFirstSkin = 0x1p-8, kThinnestSkin = 0x1p-12, kThickestSkin = 0x1p-5;
+// Near contact a skin costs more than the queries that it spares, unless the motion is small beside the gap. So there
+// is one, somewhat thicker than the last motion, that a steady one be spared every other query, where that was small or
+// the last skin nearly sufficed for it (./run solids, "moving"). Lengths are shares of the smaller root's.
+constexpr double kFirstSkin = 0x1p-8, kThinnestSkin = 0x1p-12, kSmallMotion = 0x1p-11, kLargestMotion = 0x1p-5;
+constexpr double kBeyondMotion = 1.1, kNearlySufficed = 0.6;
 constexpr double kRoundDown = 1 - 0x1p-20; // more than the rounding of a float
 
 // No point of body B has moved farther than this, as body A sees it, metres; NaN if a pose is not finite.
@@ -59,6 +61,13 @@ double motion(const PairCache& cache, const Pose& pose_a, const Pose& pose_b, do
     // Both placements are rounded, by less than kSeparationMargin of all lengths (query/ellipsoid/separation.hpp).
     return std::sqrt(turned) * reach_b + glm::length(now.translation - before.translation) +
            query::kSeparationMargin * (2 * reach_b + before.distance + now.distance);
+}
+
+// Of a pair that was separated: how thick the next skin is, metres. `spared`: the motion that the last one allowed.
+double next_skin(double moved, double spared, double smaller) {
+    const bool worth_it =
+        moved <= kSmallMotion * smaller || (moved <= kLargestMotion * smaller && spared >= kNearlySufficed * moved);
+    return worth_it ? std::max(kBeyondMotion * moved, kThinnestSkin * smaller) : 0;
 }
 
 // Only whole searches are remembered: a level limit asks another question.
@@ -191,7 +200,7 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     // Bodies that met a moment ago most often meet elsewhere, where a skin would be in the way.
     double skin = cache->verdict == Verdict::undecided ? kFirstSkin * smaller : 0;
     if (cache->verdict == Verdict::separated)
-        skin = std::clamp(moved, kThinnestSkin * smaller, kThickestSkin * smaller);
+        skin = next_skin(moved, double{cache->distance} - double{options.margin}, smaller);
     search.set_skin(static_cast<float>(skin));
     const CollideResult result = answer(query::decide(search));
     remember(result.verdict, result.pair, double{options.margin} + search.skin);
