@@ -446,6 +446,32 @@ TEST(Agreement, LargerBudgetsOnlyTighten) {
     EXPECT_GT(enclosed, 0);
 }
 
+// Children stick out of their parent's ellipsoid: where the parent is separated, they stay so.
+TEST(Agreement, WhatALevelSeparatesStaysSeparatedBelow) {
+    const scenes::ExactScene ring = scenes::exact_tree(shapes::torus(1, 0.3f, 16, 8)),
+                             sheet = scenes::exact_tree(shapes::sheet(2, 0.4f, 8), {.closed = false}),
+                             ball = scenes::exact_tree(shapes::icosphere(2), {.degree = 4});
+    const TreeView bodies[] = {*TreeView::open(ring.bytes), *TreeView::open(sheet.bytes), *TreeView::open(ball.bytes)};
+    const auto context = std::make_unique<QueryContext>();
+    Random random(79);
+    int separated_above = 0;
+    for (int i = 0; i < 20'000; ++i) {
+        const TreeView a = bodies[random.below(3)],
+                       b = *bodies[random.below(3)].scaled(static_cast<float>(random.log_in(0.02, 2)));
+        const Pose p = scenes::pose_at(random, 0), q = scenes::pose_at(random, random.in(0.5, 3));
+        bool separated = false;
+        for (uint32_t level = 0; level < std::max(a.level_count(), b.level_count()); ++level) {
+            const Verdict verdict = collide(a, p, b, q, *context, {.max_level = level}).verdict;
+            if (separated) {
+                ASSERT_EQ(verdict, Verdict::separated) << i << ' ' << level;
+                ++separated_above;
+            }
+            separated = verdict == Verdict::separated;
+        }
+    }
+    EXPECT_GT(separated_above, 1'000);
+}
+
 // ---- one within the other ----
 
 // Where no node of either meets what is at the surface of the other: only the boxes around all of them do.
