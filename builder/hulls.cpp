@@ -21,7 +21,10 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <utility>
 
@@ -38,11 +41,12 @@ constexpr size_t kFewest = 16;
 // is at most 2^14.
 constexpr double kShareRounding = 1e-9;
 
-// How far points reach along directions, up and down: loops over directions, which compilers vectorise.
+// How far points reach along directions, up and down: loops over directions, which compilers vectorise. That is why
+// they compare integers: g++ does not where a comparison of floats, which may trap, chooses two values.
 class Reaches {
 public:
     explicit Reaches(size_t directions) : count_(std::min(directions, kMost)) {
-        up_.fill(-HUGE_VALF), down_.fill(-HUGE_VALF);
+        up_.fill(key_of(-HUGE_VALF)), down_.fill(key_of(-HUGE_VALF));
     }
     void add(const Vec& point, uint32_t name) {
         const auto x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
@@ -50,8 +54,9 @@ public:
         const Directions& along = directions();
         for (size_t d = 0; d < count_; ++d) {
             const float height = (along.x[d] * x + along.y[d] * y) + along.z[d] * z;
-            highest_[d] = height > up_[d] ? name : highest_[d], up_[d] = height > up_[d] ? height : up_[d];
-            lowest_[d] = -height > down_[d] ? name : lowest_[d], down_[d] = -height > down_[d] ? -height : down_[d];
+            const int32_t up = key_of(height + 0.0f), down = key_of(0.0f - height); // never -0
+            highest_[d] = up > up_[d] ? name : highest_[d], up_[d] = std::max(up, up_[d]);
+            lowest_[d] = down > down_[d] ? name : lowest_[d], down_[d] = std::max(down, down_[d]);
         }
     }
     // Which of all points reaches farther than the others by most, if any does.
@@ -62,8 +67,10 @@ public:
     Farthest beyond(const Reaches& others) const {
         Farthest out;
         for (size_t d = 0; d < count_; ++d) {
-            if (up_[d] - others.up_[d] > out.by) out = {up_[d] - others.up_[d], highest_[d]};
-            if (down_[d] - others.down_[d] > out.by) out = {down_[d] - others.down_[d], lowest_[d]};
+            const float up = with_key(up_[d]) - with_key(others.up_[d]),
+                        down = with_key(down_[d]) - with_key(others.down_[d]);
+            if (up > out.by) out = {up, highest_[d]};
+            if (down > out.by) out = {down, lowest_[d]};
         }
         return out;
     }
@@ -75,6 +82,11 @@ public:
     }
 
 private:
+    // A float as an integer of the same order, if it is not -0, and back.
+    static int32_t ordered(int32_t bits) { return bits ^ (bits >> 31 & INT32_MAX); }
+    static int32_t key_of(float x) { return ordered(std::bit_cast<int32_t>(x)); }
+    static float with_key(int32_t key) { return std::bit_cast<float>(ordered(key)); }
+
     static constexpr size_t kMost = 48;
     struct Directions {
         std::array<float, kMost> x, y, z;
@@ -92,7 +104,7 @@ private:
         return table;
     }
     const size_t count_;
-    std::array<float, kMost> up_, down_;
+    std::array<int32_t, kMost> up_, down_; // keys
     std::array<uint32_t, kMost> highest_{}, lowest_{};
 };
 
