@@ -47,6 +47,8 @@ public:
 
     /// From now on along n, of length 1, in the body's frame.
     void turn(const glm::dvec3& n) {
+        if (turn_ == 0)
+            for (Reach& at : known_) at.turn = 0;
         ++turn_, n_ = n, base_ = 0;
         for (size_t i = 0; i < 3; ++i) {
             const double component = n[static_cast<glm::length_t>(i)];
@@ -155,7 +157,7 @@ private:
     float along_[3] = {};
     double base_ = 0; // n times the lattice's origin, steps
     uint32_t turn_ = 0;
-    Reach known_[kKnown] = {};
+    Reach known_[kKnown]; // set with the first turn, which many queries do without
 };
 
 } // namespace prolate::query::HWY_NAMESPACE

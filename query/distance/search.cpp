@@ -150,13 +150,15 @@ private:
         s_.skipped = std::min(s_.skipped, bound);
         return true;
     }
-    // Are two nodes far enough from each other along the normal of the nearest pair (reach-inl.hpp)?
+    // Are two nodes far enough from each other along the normal of the nearest pair (reach-inl.hpp)? Ellipsoids reach
+    // so far beyond their neighbours that it does not pay.
     HWY_INLINE bool beyond_normal(uint32_t node_a, uint32_t node_b, double bound) {
-        return follow_normal() && leave_enough(reaches_[0].of(node_a), reaches_[1].of(node_b), bound);
+        return all_triangles_ && follow_normal() && leave_enough(reaches_[0].of(node_a), reaches_[1].of(node_b), bound);
     }
     // The same of a pair that comes up. Inner nodes take a closer look if that may settle it; not where a level ends
     // the search, for the reason given at no_limit_.
-    HWY_INLINE bool beyond_normal(const Entry& e) {
+    HWY_INLINE bool beyond_normal(const Entry& e) { return all_triangles_ && look_along_normal(e); }
+    HWY_INLINE bool look_along_normal(const Entry& e) {
         const double bound = bound_of(e);
         if (are_leaves(e.flags)) return beyond_normal(e.node_a, e.node_b, bound);
         if (!no_limit_ || bound < kNearlyEnough * s_.enough() || !follow_normal()) return false;
@@ -181,9 +183,8 @@ private:
         const double certain = gap * (1 - 0x1p-50);
         return certain >= s_.enough() && skips(std::max(certain, bound));
     }
-    // False if there is no normal yet. Ellipsoids reach so far beyond their neighbours that it does not pay.
+    // False if there is no normal yet.
     HWY_INLINE bool follow_normal() {
-        if (!all_triangles_) return false;
         if (turn_ != s_.normals_found) {
             turn_ = s_.normals_found;
             reaches_[0].turn(s_.normal), reaches_[1].turn(-s_.normal_b);
