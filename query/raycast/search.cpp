@@ -38,10 +38,8 @@ namespace {
 
 enum class Meets {
     triangles,  // of an exact tree, by a thin ray
-    ellipsoids, // and what is thin
-    near,       // what comes within the margin
-    grown,      // ellipsoids of a cut
-    near_grown
+    ellipsoids, // and what lies within the margin
+    grown       // ellipsoids of a cut
 };
 
 template <Meets kMeets, bool kAlone> class RaycastTraversal {
@@ -79,12 +77,12 @@ public:
             if constexpr (kGrown) {
                 const LaneNodes nodes =
                     grown(load_nodes(block_, i, step_exponent), load_unaligned(s_->body.growth + first_ + i));
-                keep(i, entry_lanes<kThick>(nodes, ray, limit), limit);
+                keep(i, ellipsoid_entries(nodes, limit), limit);
             } else {
                 BoxTimes in = box_times(block_, i, ray, boxes, limit);
                 if constexpr (kMeets != Meets::triangles)
                     if (!all(in.enter > in.leave))
-                        in.enter = max(in.enter, entry_lanes<kThick>(load_nodes(block_, i, step_exponent), ray, limit));
+                        in.enter = max(in.enter, ellipsoid_entries(load_nodes(block_, i, step_exponent), limit));
                 keep(i, in.enter, in.leave);
             }
         }
@@ -169,10 +167,13 @@ public:
     }
 
 private:
-    static constexpr bool kThick = kMeets == Meets::near || kMeets == Meets::near_grown,
-                          kGrown = kMeets == Meets::grown || kMeets == Meets::near_grown;
+    static constexpr bool kGrown = kMeets == Meets::grown;
     static constexpr float kNever = std::numeric_limits<float>::infinity();
 
+    HWY_INLINE Float ellipsoid_entries(const LaneNodes& nodes, Float limit) const {
+        return lattice_ray_.thickness > 0 ? entry_lanes<true>(nodes, lattice_ray_, limit)
+                                          : entry_lanes<false>(nodes, lattice_ray_, limit);
+    }
     const std::byte* block_of(uint32_t first) const {
         if constexpr (kMeets == Meets::triangles) return side_->blocks + size_t{first / kBlockLanes} * kBlockBytes;
         return kGrown ? side_->tree.raw().block(first / kBlockLanes) : side_->block(first);
@@ -327,22 +328,21 @@ template <Meets kMeets, size_t kMost> void traverse_rays(std::span<RaycastSearch
     for (size_t i = 0; i < searches.size(); ++i) rays[i].finish();
 }
 
-template <size_t kMost> void traverse_some(std::span<RaycastSearch> searches) {
-    const RaycastBody& body = searches[0].body;
-    const bool thick = body.options.margin > 0;
-    const auto run = body.growth
-                         ? (thick ? traverse_rays<Meets::near_grown, kMost> : traverse_rays<Meets::grown, kMost>)
-                     : thick                          ? traverse_rays<Meets::near, kMost>
-                     : body.side.tree.has_triangles() ? traverse_rays<Meets::triangles, kMost>
-                                                      : traverse_rays<Meets::ellipsoids, kMost>;
-    run(searches);
+template <Meets kMeets> void traverse_some(std::span<RaycastSearch> searches) {
+    if (searches.size() == 1)
+        traverse_rays<kMeets, 1>(searches);
+    else
+        traverse_rays<kMeets, kRaysAtOnce>(searches);
 }
 
 void traverse_target(std::span<RaycastSearch> searches) {
-    if (searches.size() == 1)
-        traverse_some<1>(searches);
+    const RaycastBody& body = searches[0].body;
+    if (body.growth)
+        traverse_rays<Meets::grown, 1>(searches);
+    else if (body.side.tree.has_triangles() && !(body.options.margin > 0))
+        traverse_some<Meets::triangles>(searches);
     else
-        traverse_some<kRaysAtOnce>(searches);
+        traverse_some<Meets::ellipsoids>(searches);
 }
 
 } // namespace

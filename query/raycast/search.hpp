@@ -69,7 +69,7 @@ struct RaycastSearch {
 };
 
 /// The traversal: finds the first hit of each, or any. Of rays that are valid and not empty, all against one body,
-/// which has a stack for each, and no more than kRaysAtOnce.
+/// which has a stack for each, and no more than kRaysAtOnce; of raycast_cut(), one.
 void traverse(std::span<RaycastSearch> searches) noexcept;
 
 } // namespace prolate::query

@@ -68,59 +68,70 @@ struct FourHits {
     uint32_t open; ///< bit i: for hit() to decide
 };
 
+using FourTag = hn::CappedTag<double, RayTriangles::kLanes>;
+using Four = hn::Vec<FourTag>;
+
+/// Of the triangles from lane `at` on, the corners as the ray sees them.
+struct SeenCorners {
+    Four x[3], y[3], z[3];
+};
+HWY_INLINE void see(const RayTriangles& triangles, size_t at, const PlacedRay& ray, double scale, SeenCorners& out) {
+    const FourTag d;
+    const double origin[] = {ray.origin.x, ray.origin.y, ray.origin.z}; // glm's own [] branches
+    for (size_t c = 0; c < 3; ++c) {
+        const auto relative = [&](size_t axis) {
+            const auto stored = hn::Load(hn::Rebind<float, FourTag>(), triangles.rows[3 * c + axis] + at);
+            return hn::PromoteTo(d, stored) * hn::Set(d, scale) - hn::Set(d, origin[axis]);
+        };
+        const Four depth = relative(ray.shear.k);
+        out.x[c] = relative(ray.shear.i) - hn::Set(d, ray.shear.shear[0]) * depth;
+        out.y[c] = relative(ray.shear.j) - hn::Set(d, ray.shear.shear[1]) * depth;
+        out.z[c] = hn::Set(d, ray.shear.sign) * depth;
+    }
+}
+
 /// Hits at t <= `farthest`. `reach`: at least the triangles'.
 HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, const PlacedRay& ray, double reach,
                              double farthest) {
-    using Tag = hn::CappedTag<double, RayTriangles::kLanes>;
-    using Lanes = hn::Vec<Tag>;
     if (index_bytes(tree.vertex_count()) == sizeof(uint16_t))
         load_corners<uint16_t>(tree, triangles);
     else
         load_corners<uint32_t>(tree, triangles);
-    const Tag d;
+    const FourTag d;
     const auto set = [&](double x) { return hn::Set(d, x); };
-    const Lanes zero = set(0), scale = set(double{tree.scale()}), tau = set(kRayMargin * (ray.reach + reach)),
-                end = set(farthest * ray.shear.per_t);
+    const Four zero = set(0), never = set(std::numeric_limits<double>::infinity()),
+               tau = set(kRayMargin * (ray.reach + reach)), end = set(farthest * ray.shear.per_t);
     alignas(32) double hit_at[RayTriangles::kLanes];
-    Lanes first_hit = set(std::numeric_limits<double>::infinity());
+    Four first_hit = never;
     FourHits out{};
-    const double origin[] = {ray.origin.x, ray.origin.y, ray.origin.z}; // glm's own [] branches
     for (size_t at = 0; at < RayTriangles::kLanes; at += hn::MaxLanes(d)) {
-        Lanes x[3], y[3], z[3];
-        for (size_t c = 0; c < 3; ++c) {
-            const auto relative = [&](size_t axis) {
-                const auto stored = hn::Load(hn::Rebind<float, Tag>(), triangles.rows[3 * c + axis] + at);
-                return hn::PromoteTo(d, stored) * scale - set(origin[axis]);
-            };
-            const Lanes depth = relative(ray.shear.k);
-            x[c] = relative(ray.shear.i) - set(ray.shear.shear[0]) * depth;
-            y[c] = relative(ray.shear.j) - set(ray.shear.shear[1]) * depth;
-            z[c] = set(ray.shear.sign) * depth;
-        }
+        SeenCorners seen;
+        see(triangles, at, ray, double{tree.scale()}, seen);
+        const auto& [x, y, z] = seen;
         // Min and Max of NaN make comparisons false here, or tell of the others.
-        const auto least = [](const Lanes(&v)[3]) { return hn::Min(hn::Min(v[0], v[1]), v[2]); };
-        const auto most = [](const Lanes(&v)[3]) { return hn::Max(hn::Max(v[0], v[1]), v[2]); };
-        const Lanes low = least(z), high = most(z);
-        const Lanes beside = hn::Max(hn::Max(least(x), least(y)), hn::Neg(hn::Min(most(x), most(y))));
+        const auto least = [](const Four(&v)[3]) { return hn::Min(hn::Min(v[0], v[1]), v[2]); };
+        const auto most = [](const Four(&v)[3]) { return hn::Max(hn::Max(v[0], v[1]), v[2]); };
+        const Four low = least(z), high = most(z);
+        const Four beside = hn::Max(hn::Max(least(x), least(y)), hn::Neg(hn::Min(most(x), most(y))));
         auto missed = hn::Or(beside > tau, hn::Or(hn::Neg(high) > tau, low > end + tau));
-        Lanes weight[3];
+        Four weight[3];
         auto positive = zero > zero, negative = positive, doubted = positive;
         for (size_t c = 0; c < 3; ++c) {
             const size_t a = (c + 1) % 3, b = (c + 2) % 3;
             weight[c] = x[a] * y[b] - y[a] * x[b];
-            const Lanes bound = tau * ((hn::Abs(x[a]) + hn::Abs(y[a])) + (hn::Abs(x[b]) + hn::Abs(y[b])));
+            const Four bound = tau * ((hn::Abs(x[a]) + hn::Abs(y[a])) + (hn::Abs(x[b]) + hn::Abs(y[b])));
             const auto above = weight[c] > bound, below = hn::Neg(weight[c]) > bound;
             positive = hn::Or(positive, above), negative = hn::Or(negative, below);
             doubted = hn::Or(doubted, hn::Not(hn::Or(above, below)));
         }
         const auto met = hn::Not(hn::Or(missed, hn::And(positive, negative)));
         // All weights have the same sign for certain; it cancels.
-        const Lanes mean =
-                        (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / (weight[0] + weight[1] + weight[2]),
-                    depth = hn::Min(hn::Max(mean, low), high);
+        const Four mean =
+                       (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / (weight[0] + weight[1] + weight[2]),
+                   depth = hn::Min(hn::Max(mean, low), high);
         const auto certain = hn::And(met, hn::AndNot(doubted, hn::And(depth >= zero, depth <= end)));
-        const Lanes t = hn::Min(depth / set(ray.shear.per_t), set(ray.length));
-        const Lanes hit = hn::IfThenElse(certain, t, set(std::numeric_limits<double>::infinity()));
+        const Four t = hn::Min(depth / set(ray.shear.per_t), set(ray.length));
+        const Four hit = hn::IfThenElse(certain, t, never);
         hn::Store(hit, d, hit_at + at);
         first_hit = hn::Min(first_hit, hit);
         out.open |= bits(d, hn::AndNot(certain, met)) << at;
