@@ -34,21 +34,21 @@ HWY_BEFORE_NAMESPACE();
 namespace prolate::query::HWY_NAMESPACE {
 
 /// Of one node, metres along the normal from the body's origin.
-struct Reach {
+struct NodeReach {
     uint32_t node, turn; // which, and along which normal: the nth
     double most;         // nothing below it reaches farther,
     double spare;        // but perhaps this much less; 0: a closer look tells no more
 };
 
 /// Of a tree with triangles.
-class Reaches {
+class ReachAlong {
 public:
-    explicit Reaches(const TreeSide& side) : side_(side), step_(step_of(side.lattice)) {}
+    explicit ReachAlong(const TreeSide& side) : side_(side), step_(step_of(side.lattice)) {}
 
     /// From now on along n, of length 1, in the body's frame.
     void turn(const glm::dvec3& n) {
         if (turn_ == 0)
-            for (Reach& at : known_) at.turn = 0;
+            for (NodeReach& at : known_) at.turn = 0;
         ++turn_, n_ = n, base_ = 0;
         for (size_t i = 0; i < 3; ++i) {
             const double component = n[static_cast<glm::length_t>(i)];
@@ -56,15 +56,15 @@ public:
             base_ += component * double(side_.lattice.origin[i]);
         }
     }
-    HWY_INLINE const Reach& of(uint32_t node) {
-        Reach& at = known_[node % kKnown];
-        if (at.node != node || at.turn != turn_) at = first_look(node);
+    HWY_INLINE const NodeReach& of(uint32_t node) {
+        NodeReach& at = known_[node % kKnown];
+        if (at.turn != turn_ || at.node != node) at = first_look(node);
         return at;
     }
     /// At a closer look: of the farthest leaf, or little more. One that is no more than `enough` need not be known, and
     /// one above `hopeless` is of no use. Needs the stack that a search for one leaf does.
-    HWY_NOINLINE const Reach& closer(uint32_t node, double enough, double hopeless, Scratch::Entry* stack) {
-        const Reach before = of(node);
+    HWY_NOINLINE const NodeReach& closer(uint32_t node, double enough, double hopeless, Scratch::Entry* stack) {
+        const NodeReach before = of(node);
         const double most = farthest(node, enough, hopeless, stack);
         return known_[node % kKnown] = {node, turn_, std::min(before.most, most),
                                         most <= enough ? std::max(0.0, before.spare - (before.most - most)) : 0};
@@ -76,7 +76,7 @@ private:
 
     double metres(double steps) const { return (base_ + steps) * step_; }
 
-    HWY_NOINLINE Reach first_look(uint32_t node) const {
+    HWY_NOINLINE NodeReach first_look(uint32_t node) const {
         const uint32_t lane = node % kBlockLanes;
         const std::byte* const block = side_.block(node);
         const auto children = load_le<uint8_t>(block + kBlockCount + lane);
@@ -126,7 +126,7 @@ private:
         while (size > 0) {
             const Scratch::Entry e = stack[--size];
             if (metres(double{e.bound}) <= most) continue;
-            const Reach here = of(e.node_a);
+            const NodeReach here = of(e.node_a);
             if (here.most <= most) continue;
             if (here.spare == 0) {
                 if (here.most > hopeless) return HUGE_VAL;
@@ -157,7 +157,7 @@ private:
     float along_[3] = {};
     double base_ = 0; // n times the lattice's origin, steps
     uint32_t turn_ = 0;
-    Reach known_[kKnown]; // set with the first turn, which many queries do without
+    NodeReach known_[kKnown]; // set with the first turn, which many queries do without
 };
 
 } // namespace prolate::query::HWY_NAMESPACE

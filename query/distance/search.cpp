@@ -86,7 +86,7 @@ public:
     DistanceTraversal(DistanceSearch& search, double by_slabs) // a bound on the distance of the roots
         : s_(search),
           heap_(search.entries), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}},
-          reaches_{Reaches(search.a), Reaches(search.b)}, by_slabs_(by_slabs), room_(search.room) {}
+          reaches_{ReachAlong(search.a), ReachAlong(search.b)}, by_slabs_(by_slabs), room_(search.room) {}
 
     void run() {
         search();
@@ -162,13 +162,13 @@ private:
         const double bound = bound_of(e);
         if (are_leaves(e.flags)) return beyond_normal(e.node_a, e.node_b, bound);
         if (!no_limit_ || bound < kNearlyEnough * s_.enough() || !follow_normal()) return false;
-        const Reach &a = reaches_[0].of(e.node_a), &b = reaches_[1].of(e.node_b);
+        const NodeReach &a = reaches_[0].of(e.node_a), &b = reaches_[1].of(e.node_b);
         if (leave_enough(a, b, bound)) return true;
         const double room = (along_ - s_.enough()) - 2 * kSeparationMargin * s_.reach_of_triangles(); // for both
         if (a.most + b.most - (a.spare + b.spare) > room) return false;
         return closer_look(e, room, a, b);
     }
-    HWY_NOINLINE bool closer_look(const Entry& e, double room, Reach a, Reach b) {
+    HWY_NOINLINE bool closer_look(const Entry& e, double room, NodeReach a, NodeReach b) {
         Entry* const stack = s_.entries + heap_.size();
         if (a.spare > 0) {
             a = reaches_[0].closer(e.node_a, room - b.most, room - (b.most - b.spare), stack);
@@ -178,7 +178,7 @@ private:
         if (b.spare > 0) b = reaches_[1].closer(e.node_b, room - a.most, room - a.most, stack);
         return leave_enough(a, b, bound_of(e));
     }
-    HWY_INLINE bool leave_enough(const Reach& a, const Reach& b, double bound) {
+    HWY_INLINE bool leave_enough(const NodeReach& a, const NodeReach& b, double bound) {
         const double gap = ((along_ - b.most) - a.most) - kSeparationMargin * s_.reach_of_triangles();
         const double certain = gap * (1 - 0x1p-50);
         return certain >= s_.enough() && skips(std::max(certain, bound));
@@ -352,7 +352,7 @@ private:
     const bool no_limit_ = s_.a.limit_from == UINT32_MAX && s_.b.limit_from == UINT32_MAX;
     const bool have_slabs_ = (s_.a.has_slabs || s_.b.has_slabs) && no_limit_;
     const bool all_triangles_ = s_.a.tree.has_triangles() && s_.b.tree.has_triangles();
-    Reaches reaches_[2];
+    ReachAlong reaches_[2];
     uint32_t turn_ = 0;     // which normal they are along,
     double along_ = 0;      // and how far the way from A's origin to B's is
     const double by_slabs_; // a bound of the roots
