@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -58,7 +59,7 @@ Depths depths_of_edges(const Corner (&c)[3], double near) {
 }
 
 // Bodies as the ray sees them that shall come near: a point, how far they reach along n, and the direction from their
-// point that is nearest to x; 0 if x is one of them.
+// point that is nearest to x; 0 if x is one of them. And others to try, where rounding may have hidden which that is.
 class NearEllipsoid {
 public:
     explicit NearEllipsoid(const PlacedEllipsoid& e) : e_(e), q_(e.factor * glm::transpose(e.factor)) {}
@@ -68,6 +69,7 @@ public:
         const dvec3 r = x - e_.center;
         return glm::length(solve(e_.factor, r)) > 1 ? nearest_direction(e_.factor, q_, r) : dvec3(0);
     }
+    static std::array<dvec3, 0> others(const dvec3& /*x*/) { return {}; }
 
 private:
     const PlacedEllipsoid& e_;
@@ -94,6 +96,16 @@ public:
         const dvec3 n = glm::cross(ab, ac);
         return glm::dot(n, a) < 0 ? -n : n;
     }
+    // From the nearest point of each edge: of a needle, the signs of the areas above mean nothing.
+    std::array<dvec3, 3> others(const dvec3& x) const {
+        std::array<dvec3, 3> out;
+        for (size_t i = 0; i < 3; ++i) {
+            const dvec3 from = x - c_[i], edge = c_[(i + 1) % 3] - c_[i];
+            const double square = glm::dot(edge, edge);
+            out[i] = from - (square > 0 ? std::clamp(glm::dot(from, edge) / square, 0.0, 1.0) : 0.0) * edge;
+        }
+        return out;
+    }
 
 private:
     const dvec3 (&c_)[3];
@@ -103,31 +115,38 @@ constexpr int kNewtonSteps = 64;
 
 template <class Convex>
 std::optional<RayHit> approach(double distance, const PlacedRay& ray, const Convex& body, double tolerance) {
-    dvec3 n(0);
-    double gap = 0, slope = 0; // along n, of the ray's begin; and how it grows
-    const auto look_from = [&](double t) {
-        n = body.towards(ray.origin + t * ray.direction);
-        n /= glm::length(n); // NaN if 0, which claims nothing
-        gap = glm::dot(n, ray.origin) - body.end(n) - distance, slope = glm::dot(n, ray.direction);
+    struct Look {
+        dvec3 n;
+        double gap, slope; // along n, of the ray's begin; and how it grows
+        double at(double t) const { return gap + t * slope; }
     };
+    const auto look_along = [&](const dvec3& direction) {
+        const dvec3 n = direction / glm::length(direction); // NaN if 0, which claims nothing
+        return Look{n, glm::dot(n, ray.origin) - body.end(n) - distance, glm::dot(n, ray.direction)};
+    };
+    const auto look_from = [&](double t) { return look_along(body.towards(ray.origin + t * ray.direction)); };
     // Most that miss do so where they come near to the body's middle.
     const double square = glm::dot(ray.direction, ray.direction);
-    look_from(std::clamp(glm::dot(body.middle() - ray.origin, ray.direction) / square, 0.0, ray.length));
-    if (gap > tolerance && gap + ray.length * slope > tolerance) return {};
+    Look look = look_from(std::clamp(glm::dot(body.middle() - ray.origin, ray.direction) / square, 0.0, ray.length));
+    if (look.gap > tolerance && look.at(ray.length) > tolerance) return {};
 
     double t = 0;
     for (int i = 0; i < kNewtonSteps; ++i) {
-        look_from(t);
+        look = look_from(t);
         // Certainly separated until the gap falls to `tolerance`; the hit is certain enough within twice that.
-        const double here = gap + t * slope - tolerance;
+        double most = 2 * tolerance;
+        if (!(look.at(t) > most))
+            for (const dvec3& direction : body.others(ray.origin + t * ray.direction))
+                if (const Look other = look_along(direction); other.at(t) > most) look = other, most = other.at(t);
+        const double here = look.at(t) - tolerance;
         if (!(here > tolerance)) break;
-        if (gap + ray.length * slope > tolerance) return {};
-        const double next = t - here / slope;
+        if (look.at(ray.length) > tolerance) return {};
+        const double next = t - here / look.slope;
         if (!(next > t)) break;
         t = std::min(next, ray.length);
     }
-    const double room = t == 0 ? gap : gap + t * slope + distance; // NaN inside the body
-    return RayHit{t, room >= 0 ? n : dvec3(0)};
+    const double room = t == 0 ? look.gap : look.at(t) + distance; // NaN inside the body
+    return RayHit{t, room >= 0 ? look.n : dvec3(0)};
 }
 
 // Without branches, which directions of many rays would have guessed wrong.

@@ -789,6 +789,45 @@ TEST(Raycast, ABallThatRollsOnAFace) {
     EXPECT_EQ(ball({1, 1, 2.25f}, {1, 0, 0}, 0.5f).t, 0);
 }
 
+// Needles, whose areas are rounding alone: which of their edges is nearest shows only from the edges themselves.
+TEST(Raycast, ABallMeetsNeedlesWhereItIsNear) {
+    Random random(15);
+    Mesh mesh;
+    for (uint32_t i = 0; i < 200; ++i) {
+        const Point a = random.in_ball(), b = random.in_ball(), off = random.in_ball();
+        const double at = i % 2 == 0 ? 0.5 : random.below(2), width = i % 5 == 0 ? 0 : random.log_in(1e-9, 1e-6);
+        Point c{};
+        for (size_t k = 0; k < 3; ++k) c[k] = a[k] + at * (b[k] - a[k]) + width * off[k];
+        for (const Point& p : {a, b, c}) mesh.vertices.push_back(scenes::to_float(p));
+        mesh.triangles.push_back({3 * i + i % 3, 3 * i + (i + 1) % 3, 3 * i + (i + 2) % 3}); // any two may be the same
+    }
+    const auto scene = scenes::exact_tree(mesh, {.closed = false});
+    const auto tree = *TreeView::open(scene.bytes);
+    int met = 0, missed = 0;
+    for (int n = 0; n < 3'000; ++n) {
+        const Point from = random.direction(), to = random.in_ball();
+        const Ray ray{scenes::to_float({2 * from[0], 2 * from[1], 2 * from[2]}),
+                      scenes::to_float({to[0] - 2 * from[0], to[1] - 2 * from[1], to[2] - 2 * from[2]})};
+        const auto margin = static_cast<float>(random.log_in(1e-4, 0.1));
+        const RaycastResult result = cast(tree, {}, ray, {.margin = margin});
+        ++(result.verdict == Verdict::overlapping ? met : missed);
+        if (result.verdict != Verdict::overlapping) continue;
+        const Vector x = along(vector(ray.origin), result.t, vector(ray.direction));
+        Real nearest = HUGE_VALL;
+        for (const Vec3& v : scene.mesh.vertices) nearest = std::min(nearest, length(x - vector(v)));
+        for (const Triangle& t : scene.mesh.triangles)
+            for (size_t i = 0; i < 3; ++i) {
+                const Vector a = vector(scene.mesh.vertices[t[i]]),
+                             edge = vector(scene.mesh.vertices[t[(i + 1) % 3]]) - a;
+                const Real s = reference::dot(x - a, edge) / reference::dot(edge, edge);
+                if (s > 0 && s < 1) nearest = std::min(nearest, length(x - along(a, s, edge)));
+            }
+        ASSERT_NEAR(static_cast<double>(nearest), margin, 1e-5) << n;
+    }
+    EXPECT_GT(met, 500);
+    EXPECT_GT(missed, 200);
+}
+
 TEST(Raycast, BadInputIsUndecided) {
     const auto scene = scenes::exact_tree(shapes::box());
     const auto tree = *TreeView::open(scene.bytes);
