@@ -16,6 +16,7 @@ struct Search {
     int finalists;      ///< that are polished: which one is the tightest is only known then
     int sweeps;         ///< of the polish
     double polish_step; ///< its first one, relative to the radii
+    int trials = 0;     ///< per ellipsoid, in neighbourhoods of the set that a descent found
     int exchanges = 0;  ///< tried of sets of few ellipsoids, see exchange.hpp: each a shorter descent
 };
 
@@ -24,23 +25,22 @@ struct Effort {
     Search few;          ///< for sets of up to 16 ellipsoids
     Search search;       ///< for those of up to 64
     Search many;         ///< for larger ones, of which starts differ little and a large step of the polish gains more
-    Search middle; ///< a second search for sets of 17 to 64 ellipsoids, which long descents often suit; if starts > 0
     double distance_tolerance; ///< of measured distances: of the largest one, in diagonals
     uint32_t distance_samples; ///< for their mean and percentile
 };
 
 constexpr Effort effort_of(Quality quality) {
-    constexpr Search none{}, fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01},
-        few{3, 1500, 2, 1, 12, 0.01, 24}, best{3, 1500, 2, 1, 12, 0.05};
+    constexpr Search fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01}, few{3, 1500, 2, 1, 12, 0.1, 4, 24},
+        best{3, 1500, 2, 1, 12, 0.1, 6};
     switch (quality) {
     case Quality::fast:
-        return {64, fast, fast, {1, 300, 0, 1, 6, 0.05}, none, 1e-3, 2000};
+        return {64, fast, fast, {1, 300, 0, 1, 6, 0.05}, 1e-3, 2000};
     case Quality::normal:
-        return {96, normal, normal, {1, 1000, 0, 1, 16, 0.05}, none, 1e-4, 8000};
+        return {96, normal, normal, {1, 1000, 0, 1, 16, 0.05}, 1e-4, 8000};
     case Quality::best:
         break;
     }
-    return {192, few, best, {3, 1500, 2, 1, 12, 0.05}, {3, 4000, 0, 2, 20, 0.05}, 1e-4, 32000};
+    return {192, few, best, {3, 1500, 2, 1, 12, 0.05}, 1e-4, 32000};
 }
 
 /// How an exact tree is looked for.

@@ -4,6 +4,7 @@
 #include "builder/divide.hpp"
 #include "builder/exchange.hpp"
 #include "builder/job.hpp"
+#include "builder/neighbourhood_search.hpp"
 #include "builder/random.hpp"
 
 #include <algorithm>
@@ -34,7 +35,12 @@ constexpr int kPolishDirections = 256;
 constexpr double kMostLoss = 1.15;
 constexpr int kLeastIterations = 75; // that tell anything
 constexpr double kReheat = 10;       // kappa at the start of a cycle
-constexpr double kLeastWorth = 0.5;  // of a further ellipsoid, in means of those that are there
+// Of a trial in a neighbourhood: how many descend together, for how long, from which kappa.
+constexpr size_t kTrialSize = 6;
+constexpr int kTrialIterations = 200;
+constexpr double kTrialKappa = 6;
+constexpr double kSearchShare = 0.9, kDescentShare = 0.6; // of the time: the latter where there are such trials
+constexpr double kLeastWorth = 0.5;                       // of a further ellipsoid, in means of those that are there
 
 } // namespace
 
@@ -82,18 +88,13 @@ FlatSet FlatSetMaker::single() const {
 }
 
 FlatSet FlatSetMaker::make(uint32_t count, const FlatSet* above, const std::function<void(double)>& progress) {
+    const Search& search = count > kMergeLimit ? effort_.many : count > kFew ? effort_.search : effort_.few;
     FlatSet best;
-    const auto look = [&](const Search& search, double begin, double end) {
-        const auto report = [&](double done) { progress(begin + done * (end - begin)); };
-        for (std::vector<Fit>& fits : approach(count, search, above, report)) {
-            FlatSet set = settle(std::move(fits), count, search);
-            if (!best.parts.empty()) follow_cuts(best, solid_.pieces);
-            if (best.parts.empty() || set.outside < best.outside) best = std::move(set);
-        }
-    };
-    const bool twice = effort_.middle.starts > 0 && count > kFew && count <= kMergeLimit;
-    look(count > kMergeLimit ? effort_.many : count > kFew ? effort_.search : effort_.few, 0, twice ? 0.3 : 1);
-    if (twice) look(effort_.middle, 0.3, 1);
+    for (std::vector<Fit>& fits : approach(count, search, above, progress)) {
+        FlatSet set = settle(std::move(fits), count, search);
+        if (!best.parts.empty()) follow_cuts(best, solid_.pieces);
+        if (best.parts.empty() || set.outside < best.outside) best = std::move(set);
+    }
     return best;
 }
 
@@ -110,10 +111,12 @@ std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const Searc
     } else if (above)
         starts = std::max(starts, 2); // the last one knows of no set above
     const int exchanges = count <= kFew ? search.exchanges : 0, rounds = starts + search.cycles + exchanges;
+    const double share = search.trials > 0 ? kDescentShare : kSearchShare;
     std::vector<Start> best; // best first
     std::vector<double> least;
     const auto attempt = [&](Start now, int round, int length, double kappa) {
-        descend_from(now, points, length, kappa, round, [&](double done) { progress(0.9 * (round + done) / rounds); });
+        descend_from(now, points, length, kappa, round,
+                     [&](double done) { progress(share * (round + done) / rounds); });
         double error = approximate_error(now.fits);
         if (above && now.family.empty()) error *= kMostLoss;
         const auto place = std::ranges::upper_bound(least, error) - least.begin();
@@ -134,7 +137,12 @@ std::vector<std::vector<Fit>> FlatSetMaker::approach(uint32_t count, const Searc
     }
     std::vector<std::vector<Fit>> out;
     out.reserve(best.size());
-    for (Start& one : best) out.push_back(std::move(one.fits));
+    for (Start& one : best) {
+        if (search.trials > 0)
+            improve_places(one.fits, search, points,
+                           [&](double done) { progress(share + (kSearchShare - share) * done); });
+        out.push_back(std::move(one.fits));
+    }
     return out;
 }
 
@@ -147,6 +155,16 @@ bool FlatSetMaker::better_alone(uint32_t count, const FlatSet& above, std::span<
         return approximate_error(one.fits);
     };
     return kMostLoss * error(nullptr) < error(&above);
+}
+
+void FlatSetMaker::improve_places(std::vector<Fit>& fits, const Search& search, std::span<const Vec> points,
+                                  const std::function<void(double)>& progress) const {
+    search_neighbourhoods(fits, solid_.field, points,
+                          {.descent = descent_options(fits.size(), kTrialIterations, kTrialKappa, 0),
+                           .size = kTrialSize,
+                           .trials = search.trials * static_cast<int>(fits.size()),
+                           .error = [this](std::span<const Fit> some) { return approximate_error(some); },
+                           .progress = progress});
 }
 
 // Where one ellipsoid less in one place and one more in another may be tighter.
@@ -328,22 +346,23 @@ Objective FlatSetMaker::objective(size_t count) const {
     return {double{options_.alpha}, double{options_.beta}, std::max(by_volume, by_area)};
 }
 
+DescentOptions FlatSetMaker::descent_options(size_t count, int iterations, double kappa, int number) const {
+    const double directions = 800 / std::sqrt(static_cast<double>(count));
+    return {.objective = objective(count),
+            .primitive = options_.primitive,
+            .iterations = iterations,
+            .directions = static_cast<int>(std::clamp(directions, 96.0, 384.0)),
+            .min_radius = min_radius_,
+            .relocate = count > kFew,
+            .first_kappa = kappa,
+            .pull = count > kMergeLimit ? kPull * std::min(1.0, kPullIterations / iterations) : kPull,
+            .seed = Random(options_.seed + static_cast<uint64_t>(number)).bits()};
+}
+
 void FlatSetMaker::descend_from(Start& start, std::span<const Vec> points, int iterations, double kappa, int number,
                                 const std::function<void(double)>& progress) const {
-    const size_t count = start.fits.size();
-    const double directions = 800 / std::sqrt(static_cast<double>(count));
-    const DescentOptions options{.objective = objective(count),
-                                 .primitive = options_.primitive,
-                                 .iterations = iterations,
-                                 .directions = static_cast<int>(std::clamp(directions, 96.0, 384.0)),
-                                 .min_radius = min_radius_,
-                                 .relocate = count > kFew,
-                                 .first_kappa = kappa,
-                                 .pull =
-                                     count > kMergeLimit ? kPull * std::min(1.0, kPullIterations / iterations) : kPull,
-                                 .seed = Random(options_.seed + static_cast<uint64_t>(number)).bits(),
-                                 .family = start.family,
-                                 .progress = progress};
+    DescentOptions options = descent_options(start.fits.size(), iterations, kappa, number);
+    options.family = start.family, options.progress = progress;
     descend(start.fits, solid_.field, points, start.owner, options);
 }
 

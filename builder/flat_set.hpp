@@ -85,6 +85,9 @@ private:
     };
     std::vector<std::vector<Fit>> approach(uint32_t count, const Search& search, const FlatSet* above,
                                            const std::function<void(double)>& progress) const;
+    void improve_places(std::vector<Fit>& fits, const Search& search, std::span<const Vec> points,
+                        const std::function<void(double)>& progress) const;
+    DescentOptions descent_options(size_t count, int iterations, double kappa, int number) const;
     bool better_alone(uint32_t count, const FlatSet& above, std::span<const Vec> points, int iterations) const;
     std::vector<std::vector<Fit>> next_to(std::span<const Fit> fits, size_t most) const;
     FlatSet settle(std::vector<Fit> fits, size_t count, const Search& search);

@@ -49,10 +49,12 @@ public:
                     std::vector<uint32_t> owner, const DescentOptions& options)
         : fits_(fits), field_(field), points_(points), owner_(std::move(owner)), options_(options),
           random_(options.seed), directions_(even_directions(options.directions)), rotated_(directions_.size()),
-          multiplier_(points.size(), 0), momentum_(fits_.size()) {}
+          multiplier_(points.size(), 0), momentum_(fits_.size()), moving_(fits_.size()) {
+        fits_.insert(fits_.end(), options.fixed.begin(), options.fixed.end());
+    }
 
     void run() {
-        std::vector<Fit> next(fits_.size());
+        std::vector<Fit> next = fits_;
         for (int iteration = 0; iteration < options_.iterations; ++iteration) {
             checkpoint();
             const double t = static_cast<double>(iteration) / std::max(1, options_.iterations - 1);
@@ -68,11 +70,12 @@ public:
             const Mat rotation = random_rotation(random_);
             for (size_t d = 0; d < directions_.size(); ++d) rotated_[d] = rotation * directions_[d];
             update_points(static_cast<size_t>(iteration), t > kAccumulateFrom);
-            parallel_for(size_t{0}, fits_.size(), [&](size_t i) { next[i] = step(i); });
+            parallel_for(size_t{0}, moving_, [&](size_t i) { next[i] = step(i); });
             fits_.swap(next);
             decay_mean_ *= kMean, decay_square_ *= kSquare;
             if (options_.progress && iteration % 16 == 0) options_.progress(t);
         }
+        fits_.resize(moving_);
     }
 
 private:
@@ -90,12 +93,31 @@ private:
         step_ = kFirstStep * s * s * std::min(1.0, 10 / options_.first_kappa);
     }
 
-    // Weight of the border point x of ellipsoid i; `hint` is the neighbour that hid the last one.
-    double weight(size_t i, const Vec& x, size_t& hint) const {
-        const std::vector<uint32_t>& others = neighbours_[i];
-        for (size_t n = 0; n < others.size(); ++n) {
+    // The neighbours that may hide some of ellipsoid i's border, those that reach deepest into it first. The others are
+    // beyond a plane between: that across the line of centers, in the coordinates that make i the unit ball.
+    std::vector<const Fit*> hiders_of(size_t i) const {
+        std::vector<std::pair<double, const Fit*>> near;
+        near.reserve(neighbours_[i].size());
+        const Fit& fit = fits_[i];
+        for (const uint32_t other : neighbours_[i]) {
+            const Vec y = fit.radial(fits_[other].center);
+            const double far = y.norm();
+            const Vec normal = fit.inverse.transpose() * y;
+            const double gap = far * far - (fits_[other].factor.transpose() * normal).norm() - far;
+            if (gap < 1e-9) near.emplace_back(far > 0 ? gap / far : -HUGE_VAL, &fits_[other]);
+        }
+        std::ranges::stable_sort(near, {}, &std::pair<double, const Fit*>::first);
+        std::vector<const Fit*> out;
+        out.reserve(near.size());
+        for (const auto& [gap, other] : near) out.push_back(other);
+        return out;
+    }
+
+    // Weight of the border point x, given what may hide it; `hint` is what hid the last one.
+    double weight(const std::vector<const Fit*>& hiders, const Vec& x, size_t& hint) const {
+        for (size_t n = 0; n < hiders.size(); ++n) {
             const size_t at = n == 0 ? hint : n == hint ? 0 : n; // the hint first
-            if (fits_[others[at]].radial_squared(x) >= 1) continue;
+            if (hiders[at]->radial_squared(x) >= 1) continue;
             hint = at;
             return 0;
         }
@@ -108,8 +130,9 @@ private:
         Mat g = Mat::Zero();
         size_t hint = 0;
         const Fit& fit = fits_[i];
+        const std::vector<const Fit*> hiders = hiders_of(i);
         for (const Vec& u : rotated_) {
-            const double w = weight(i, fit.center + fit.factor * u, hint);
+            const double w = weight(hiders, fit.center + fit.factor * u, hint);
             if (w == 0) continue;
             s += w * u;
             g += w * u * u.transpose();
@@ -136,7 +159,7 @@ private:
 
     // Who covers each point, how hard those that nobody covers pull, and on whom.
     void update_points(size_t iteration, bool accumulating) {
-        const double rate = (accumulating ? options_.pull : kEarlyPull * kappa_) * static_cast<double>(fits_.size()) /
+        const double rate = (accumulating ? options_.pull : kEarlyPull * kappa_) * static_cast<double>(moving_) /
                             static_cast<double>(std::max<size_t>(1, points_.size()));
         tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
             for (size_t p = range.begin(); p != range.end(); ++p) {
@@ -146,7 +169,7 @@ private:
                 multiplier_[p] = static_cast<float>(std::max(0.0, before + rate * excess));
             }
         });
-        pull_.assign(fits_.size(), {Vec::Zero(), Mat::Zero()});
+        pull_.assign(moving_, {Vec::Zero(), Mat::Zero()});
         for (size_t p = 0; p < points_.size(); ++p) {
             if (multiplier_[p] == 0) continue;
             const Fit& fit = fits_[owner_[p]];
@@ -165,7 +188,7 @@ private:
         double nearest = fits_[old].radial_squared(x);
         if (nearest > 1)
             for (const uint32_t other : neighbours_[old])
-                if (const double radial = fits_[other].radial_squared(x); radial < nearest)
+                if (const double radial = fits_[other].radial_squared(x); radial < nearest && other < moving_)
                     nearest = radial, owner_[p] = other;
         return std::sqrt(nearest);
     }
@@ -173,7 +196,7 @@ private:
     // Points whose owner has moved away for good look for the most central one of all.
     void find_lost_points() {
         constexpr double kLost = 3;
-        const CentralTree tree(fits_);
+        const CentralTree tree(std::span<const Fit>(fits_).first(moving_));
         tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
             for (size_t p = range.begin(); p != range.end(); ++p) {
                 const double radial = fits_[owner_[p]].radial_squared(points_[p]);
@@ -273,6 +296,7 @@ private:
     std::vector<float> multiplier_; // of each point
     std::vector<Pull> pull_;        // of all points on each ellipsoid
     std::vector<Momentum> momentum_;
+    const size_t moving_;                                // the first so many do
     double decay_mean_ = kMean, decay_square_ = kSquare; // powers of the above: what is missing from young averages
     std::vector<std::vector<uint32_t>> neighbours_;
     double kappa_ = 1, step_ = kFirstStep;

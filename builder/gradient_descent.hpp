@@ -52,6 +52,8 @@ struct DescentOptions {
     uint64_t seed;
     /// Empty, or a number for each ellipsoid: one helps only such as have the same.
     std::span<const uint32_t> family = {};
+    /// Ellipsoids beside `fits` that stay as they are and hide what they hold. Not together with relocate.
+    std::span<const Fit> fixed = {};
     std::function<void(double)> progress = {}; ///< called now and then with the share that is done
 };
 

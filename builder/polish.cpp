@@ -25,10 +25,10 @@ constexpr size_t kCuts = 24; // constraints added a round
 constexpr int kDualSweeps = 100;
 
 bool holds(const Fit& fit, double shortest_inverse, const Pieces& pieces, uint32_t piece, double held = kHeld) {
-    const double radial = std::sqrt(fit.radial_squared(pieces.center(piece)));
+    const double squared = fit.radial_squared(pieces.center(piece));
     const double spread = pieces.radius(piece) * shortest_inverse;
-    if (radial + spread <= 1) return true;
-    if (radial - spread > 1.01) return false;
+    if (spread <= 1 && squared <= (1 - spread) * (1 - spread)) return true;
+    if (squared > (1.01 + spread) * (1.01 + spread)) return false;
     for (const Vec& p : pieces.points(piece))
         if (fit.radial_squared(p) > held) return false;
     return true;
@@ -147,13 +147,12 @@ private:
     void find_candidates() {
         neighbours_ = neighbours_of(fits_, kPolishMargin);
         parallel_for(size_t{0}, fits_.size(), [&](size_t i) {
-            const Box box = box_of(fits_[i], kPolishMargin);
+            const Fit& fit = fits_[i];
+            const double shortest_inverse = fit.inverse.norm();
             candidates_[i].clear();
-            pieces_.for_each_near(box, [&](uint32_t piece) {
-                const Vec& c = pieces_.center(piece);
-                const double r = pieces_.radius(piece);
-                if (((c - box.low).array() < -r).any() || ((box.high - c).array() < -r).any()) return;
-                candidates_[i].push_back(piece);
+            pieces_.for_each_near(box_of(fit, kPolishMargin), [&](uint32_t piece) {
+                const double far = kPolishMargin + pieces_.radius(piece) * shortest_inverse;
+                if (fit.radial_squared(pieces_.center(piece)) <= far * far) candidates_[i].push_back(piece);
             });
             find_held(i);
         });
@@ -248,9 +247,13 @@ private:
         // Cutting planes: what sticks out of the step that the constraints at hand admit becomes a constraint too.
         std::vector<Vec> points;
         const double far = 1 - 4 * step_;
-        for (const uint32_t piece : alone)
+        const double shortest_inverse = fit.inverse.norm();
+        for (const uint32_t piece : alone) {
+            const double deep = far - pieces_.radius(piece) * shortest_inverse;
+            if (deep > 0 && fit.radial_squared(pieces_.center(piece)) < deep * deep) continue;
             for (const Vec& p : pieces_.points(piece))
                 if (fit.radial_squared(p) >= far * far) points.push_back(p);
+        }
         std::vector<Constraint> constraints;
         std::vector<std::pair<double, size_t>> out;
         Fit next = fit;

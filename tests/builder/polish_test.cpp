@@ -1,6 +1,7 @@
 // Starts and polish: whatever the start was, the result covers every piece.
 #include "builder/exchange.hpp"
 #include "builder/flat_set.hpp"
+#include "builder/neighbourhood_search.hpp"
 #include "builder/polish.hpp"
 #include "builder/random.hpp"
 #include "builder/start.hpp"
@@ -337,6 +338,66 @@ TEST(RefineSeams, CutsWhatNobodyHoldsAndNothingElse) {
         if (!held(set, scene.pieces, piece, 1.01)) {
             EXPECT_FALSE(scene.pieces.refine(piece));
         }
+}
+
+// --- neighbourhoods -------------------------------------------------------------------------------------------------
+
+// What a search in neighbourhoods gets: a set that a short descent found, and points.
+struct Rough {
+    const Scene& scene;
+    std::vector<Fit> fits;
+    std::vector<Vec> points;
+
+    explicit Rough(const Scene& s) : scene(s), fits(spread(s, 16, Primitive::ellipsoid)) {
+        for (uint32_t piece = 0; piece < scene.pieces.size(); ++piece)
+            scene.pieces.for_each_surface_point(piece, [this](const Vec& p) { points.push_back(p); });
+    }
+    double error(std::span<const Fit> some) const {
+        std::vector<Ellipsoid> ellipsoids;
+        for (const Fit& fit : some) ellipsoids.push_back(fit.ellipsoid());
+        const CoverVolume v = measure_cover(scene.columns, ellipsoids);
+        return v.outside.value + 50 * (v.solid.value - (v.whole.value - v.outside.value));
+    }
+    void search(int trials) {
+        search_neighbourhoods(fits, scene.field, points,
+                              {.descent = {.objective = {0.5, 0.5, 0.3},
+                                           .primitive = Primitive::ellipsoid,
+                                           .iterations = 100,
+                                           .directions = 96,
+                                           .min_radius = kMinRadius,
+                                           .relocate = false,
+                                           .first_kappa = 4,
+                                           .seed = 7},
+                               .size = 4,
+                               .trials = trials,
+                               .error = [this](std::span<const Fit> some) { return error(some); },
+                               .progress = {}});
+    }
+};
+
+TEST(NeighbourhoodSearch, LowersTheErrorTrialByTrial) {
+    for (const auto& scene : scenes()) {
+        double last = HUGE_VAL;
+        for (const int trials : {0, 8, 64}) {
+            Rough rough(*scene); // the longer search begins as the shorter one does
+            rough.search(trials);
+            const double error = rough.error(rough.fits);
+            EXPECT_LE(error, last) << trials;
+            EXPECT_EQ(rough.fits.size(), 16u);
+            last = error;
+        }
+        EXPECT_LT(last, Rough(*scene).error(Rough(*scene).fits));
+    }
+}
+
+TEST(NeighbourhoodSearch, IsTheSameForAnyNumberOfThreads) {
+    const Scene scene(shapes::torus(1, 0.3f, 40, 20));
+    Rough sets[2] = {Rough(scene), Rough(scene)};
+    for (const size_t run : {0u, 1u}) tbb::task_arena(run == 0 ? 1 : 4).execute([&] { sets[run].search(24); });
+    for (size_t i = 0; i < sets[0].fits.size(); ++i) {
+        EXPECT_EQ(sets[0].fits[i].center, sets[1].fits[i].center);
+        EXPECT_EQ(sets[0].fits[i].factor, sets[1].fits[i].factor);
+    }
 }
 
 // --- flat sets ------------------------------------------------------------------------------------------------------
