@@ -31,7 +31,7 @@ struct Effort {
 
 constexpr Effort effort_of(Quality quality) {
     constexpr Search fast{1, 300, 0, 1, 4, 0.01}, normal{2, 500, 0, 1, 8, 0.01}, few{3, 1500, 2, 1, 12, 0.1, 4, 24},
-        best{3, 1500, 2, 1, 12, 0.1, 6};
+        best{3, 4000, 0, 1, 12, 0.1, 8};
     switch (quality) {
     case Quality::fast:
         return {64, fast, fast, {1, 300, 0, 1, 6, 0.05}, 1e-3, 2000};
