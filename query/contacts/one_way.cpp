@@ -132,9 +132,10 @@ bool OneWay::confirm() noexcept {
     const auto add = [this](const Contact& c) { take(c); };
     const Patch from = points_; // which it adds to
     if (by_climbs_) {
-        bodies_.deepest(from, way_, add);
+        bodies_.deepest(from, {way_.normal, HUGE_VAL}, add);
         if (points_.depth() < way_.depth - (1 - kConfirmed) * std::abs(way_.depth) - bodies_.same_point) return false;
         points_.deepen(way_.depth);
+        way_.depth = points_.depth();
     } else {
         const TouchingBodies::Inside inside = bodies_.deepest_inside(from, way_, add);
         points_.deepen(inside.overlap);
