@@ -21,8 +21,9 @@ constexpr double kSteep = 0.4, kAskew = 0.1;
 constexpr double kConfirmed = 0.75;                         // something must lie as deep
 constexpr double kSlackOfWay = 0.02;                        // what pairs may overlap by more
 constexpr double kOwnShorter = 0.7, kOwnMuchShorter = 0.25; // a pair whose own way is as short takes that, not this one
-constexpr double kLeanOutwards = 0x1p-6;                    // of what lies as far out, the deeper counts
-constexpr double kOutline = 0x1p-10; // of the extent: what lies farther out by less does not matter
+constexpr double kBeside = 1.5;          // by more, the deepest points of the two bodies do not lie opposite each other
+constexpr double kLeanOutwards = 0x1p-6; // of what lies as far out, the deeper counts
+constexpr double kOutline = 0x1p-10;     // of the extent: what lies farther out by less does not matter
 
 double length_or_one(const dvec3& v) {
     const double length = glm::length(v);
@@ -119,7 +120,7 @@ void OneWay::add(const MeetingPair& pair) noexcept {
     const auto extent = [&](const dvec3& d) {
         return Extent{std::max(-support(a, -d), -support(b, -d)), std::min(support(a, d), support(b, d))};
     };
-    const bool resolved = overlap <= way_.depth + kSlackOfWay * std::abs(way_.depth) + bodies_.same_point;
+    const bool resolved = overlap <= most();
     if (by_climbs_ && resolved && !points_.empty() &&
         !(points_.gain(overlap, bodies_.same_point, kOutline, extent) > -2 * bodies_.same_point))
         return;
@@ -127,31 +128,42 @@ void OneWay::add(const MeetingPair& pair) noexcept {
 }
 
 bool OneWay::confirm() noexcept {
-    const auto own_is_shorter = [&] { return own_ < kOwnMuchShorter * points_.depth() - bodies_.same_point; };
-    if (points_.empty() || own_is_shorter()) return false;
-    const auto add = [this](const Contact& c) { take(c); };
+    return !points_.empty() && (by_climbs_ ? confirm_climbs() : confirm_inside());
+}
+
+// What pairs may overlap by, if this is the way.
+double OneWay::most() const noexcept {
+    return way_.depth + kSlackOfWay * std::abs(way_.depth) + bodies_.same_point;
+}
+
+// Other parts of the bodies may be deeper than what was climbed.
+bool OneWay::confirm_climbs() noexcept {
+    if (points_.depth() > most() || beside_ > most()) return false;
     const Patch from = points_; // which it adds to
-    if (by_climbs_) {
-        bodies_.deepest(from, {way_.normal, HUGE_VAL}, add);
-        if (points_.depth() < way_.depth - (1 - kConfirmed) * std::abs(way_.depth) - bodies_.same_point) return false;
-        points_.deepen(way_.depth);
-        way_.depth = points_.depth();
-    } else {
-        const TouchingBodies::Inside inside = bodies_.deepest_inside(from, way_, add);
-        points_.deepen(inside.overlap);
-        way_.depth = points_.depth();
-        bears_ = inside.face;
-        if (bears_ == dvec3(0)) { // points of pairs are the deepest
-            FacesMean there;
-            const MeetingPair& pair = points_.deepest().pair;
-            there.add(bodies_.triangle_a(pair), bodies_.triangle_b(pair));
-            bears_ = there.direction();
-        }
-        if (glm::dot(bears_, way_.normal) < 0) bears_ = -bears_;
-        if (glm::dot(bears_, way_.normal) < kFacing) return false; // another direction, or several
+    bodies_.deepest(from, {way_.normal, HUGE_VAL}, [this](const Contact& c) { take(c); });
+    if (points_.depth() < way_.depth - (1 - kConfirmed) * std::abs(way_.depth) - bodies_.same_point) return false;
+    points_.deepen(way_.depth);
+    way_.depth = points_.depth();
+    return true;
+}
+
+bool OneWay::confirm_inside() noexcept {
+    const auto own_is_shorter = [&] { return own_ < kOwnMuchShorter * points_.depth() - bodies_.same_point; };
+    const Patch from = points_; // which it adds to
+    if (own_is_shorter()) return false;
+    const TouchingBodies::Inside inside = bodies_.deepest_inside(from, way_, [this](const Contact& c) { take(c); });
+    points_.deepen(std::min(inside.overlap, kBeside * points_.depth()));
+    way_.depth = points_.depth();
+    bears_ = inside.face;
+    if (bears_ == dvec3(0)) { // points of pairs are the deepest
+        FacesMean there;
+        const MeetingPair& pair = points_.deepest().pair;
+        there.add(bodies_.triangle_a(pair), bodies_.triangle_b(pair));
+        bears_ = there.direction();
     }
-    const double most = way_.depth + kSlackOfWay * std::abs(way_.depth) + bodies_.same_point;
-    return points_.depth() <= most && beside_ <= most && !own_is_shorter();
+    if (glm::dot(bears_, way_.normal) < 0) bears_ = -bears_;
+    // Else another direction, or several.
+    return glm::dot(bears_, way_.normal) >= kFacing && beside_ <= most() && !own_is_shorter();
 }
 
 } // namespace prolate::query

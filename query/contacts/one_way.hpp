@@ -49,6 +49,9 @@ private:
     void start(const Way& way, bool by_climbs) noexcept;
     bool clip(const MeetingPair& pair, const PlacedTriangle& a, const PlacedTriangle& b) noexcept;
     void take(const Contact& contact) noexcept;
+    double most() const noexcept;
+    bool confirm_climbs() noexcept;
+    bool confirm_inside() noexcept;
 
     TouchingBodies& bodies_;
     const Candidates& candidates_;

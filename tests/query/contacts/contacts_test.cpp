@@ -601,6 +601,23 @@ TEST(Contacts, ABudgetBoundsTriangleTestsToo) {
 }
 
 // Of these trees some leaves lie above the last level: among the nodes that meet are some with triangles, and others.
+// Where a body touches with parts that do not hang together, or hang together far from there, climbs around one do not
+// see how deep the others are.
+TEST(Contacts, TheDepthIsThatOfTheDeepestPart) {
+    const Solid ground = exact(shapes::moved(shapes::box(20, 20, 4), {-10, -10, -4}));
+    for (const float higher : {0.0f, 0.02f, 0.05f, 0.08f, 0.11f}) {
+        Mesh feet = shapes::moved(shapes::icosphere(4), {-2, 0, 0});
+        shapes::append(feet, shapes::moved(shapes::icosphere(4), {2, 0, higher}));
+        for (const bool bar : {false, true}) {
+            if (bar) shapes::append(feet, shapes::moved(shapes::box(5, 1, 1), {-2.5, -0.5, 0}));
+            const Pose pose{{0.1f, 0.2f, 0.88f}, {}};
+            const ContactManifolds m = fresh(ground, {}, exact(feet), pose);
+            ASSERT_EQ(m.count, 1u);
+            EXPECT_NEAR(depth_of(m.manifolds[0]), 0.12, 1e-4) << higher;
+        }
+    }
+}
+
 TEST(Contacts, ALevelMayCutWhereSomeNodesAreLeaves) {
     const scenes::ExactScene scene =
         scenes::exact_tree(shapes::torus(1, 0.3f, 37, 17), {.degree = 5, .leaf_triangles = 2});
