@@ -86,23 +86,26 @@ Surrounded TouchingBodies::surrounded_b(uint32_t triangle) const noexcept {
             .rotation = &b_to_a.rotation};
 }
 
+Contact TouchingBodies::contact_of(const TriangleContact& found, uint32_t point,
+                                   const MeetingPair& pair) const noexcept {
+    const TriangleContact::Point& p = found.points[point];
+    const bool beside = p.of_a == kFace && p.of_b == kFace;
+    const auto part = [beside](const TreeView& tree, uint32_t triangle, Feature feature) {
+        return beside ? whole_of(0, triangle) : part_of(tree, triangle, feature);
+    };
+    return {.pair = pair,
+            .normal = found.normal,
+            .middle = 0.5 * (p.on_a + p.on_b),
+            .depth = p.depth,
+            .a = part(tree_a, pair.triangle_a, p.of_a),
+            .b = part(tree_b, pair.triangle_b, p.of_b),
+            .overlap = found.overlap};
+}
+
 ContactsOfPair TouchingBodies::contacts_of(const TriangleContact& found, const MeetingPair& pair) const noexcept {
     ContactsOfPair out;
     out.certain = found.faces;
-    for (uint32_t i = 0; i < found.count; ++i) {
-        const TriangleContact::Point& p = found.points[i];
-        const bool beside = p.of_a == kFace && p.of_b == kFace;
-        const auto part = [beside](const TreeView& tree, uint32_t triangle, Feature feature) {
-            return beside ? whole_of(0, triangle) : part_of(tree, triangle, feature);
-        };
-        out.add({.pair = pair,
-                 .normal = found.normal,
-                 .middle = 0.5 * (p.on_a + p.on_b),
-                 .depth = p.depth,
-                 .a = part(tree_a, pair.triangle_a, p.of_a),
-                 .b = part(tree_b, pair.triangle_b, p.of_b),
-                 .overlap = found.overlap});
-    }
+    for (uint32_t i = 0; i < found.count; ++i) out.add(contact_of(found, i, pair));
     return out;
 }
 

@@ -101,7 +101,8 @@ public:
     PlacedTriangle triangle_b(const MeetingPair& pair) const noexcept { return place(tree_b, pair.triangle_b, b_to_a); }
     Surrounded surrounded_a(uint32_t triangle) const noexcept;
     Surrounded surrounded_b(uint32_t triangle) const noexcept;
-    /// Of a pair of triangles.
+    /// Of a pair of triangles: one, or all.
+    Contact contact_of(const TriangleContact& found, uint32_t point, const MeetingPair& pair) const noexcept;
     ContactsOfPair contacts_of(const TriangleContact& found, const MeetingPair& pair) const noexcept;
 
     /// What the bodies overlap by along n around a pair of triangles; what is above `enough` may be too little.

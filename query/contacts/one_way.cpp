@@ -109,7 +109,11 @@ bool OneWay::clip(const MeetingPair& pair, const PlacedTriangle& a, const Placed
     if (glm::dot(way_.normal, out_a) < -kAskew * glm::length(out_a)) return false;
     if (glm::dot(way_.normal, out_b) > kAskew * glm::length(out_b)) return false;
     const TriangleContact found = contact_along(way_.normal, a, b, bodies_.margin, kSteep);
-    for (const Contact& c : bodies_.contacts_of(found, pair)) take(c);
+    for (uint32_t i = 0; i < found.count; ++i) {
+        const TriangleContact::Point& p = found.points[i];
+        if (points_.may_take(0.5 * (p.on_a + p.on_b), p.depth, bodies_.same_point))
+            take(bodies_.contact_of(found, i, pair));
+    }
     return found.count > 0;
 }
 
