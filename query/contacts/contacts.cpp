@@ -298,7 +298,8 @@ private:
 
     void add_points(const MeetingPair& pair, const Own& own) {
         if (of_ellipsoids_ && own.known) return add_by_itself(waiting_.contacts[own.waiting]);
-        if (!of_ellipsoids_ && add_along_ways(pair)) return;
+        const bool has_triangle = pair.triangle_a != kNoTriangle || pair.triangle_b != kNoTriangle;
+        if (has_triangle && add_along_ways(pair)) return; // above a level's cut there may be none
         if (own.known && !own.certain) return add_by_itself(waiting_.contacts[own.waiting]);
         const ContactsOfPair found = own.known ? pairs_.along(own.normal, pair) : pairs_.by_itself(pair);
         for (const Contact& c : found) add_by_itself(c);
