@@ -600,7 +600,6 @@ TEST(Contacts, ABudgetBoundsTriangleTestsToo) {
     }
 }
 
-// Of these trees some leaves lie above the last level: among the nodes that meet are some with triangles, and others.
 // Where a body touches with parts that do not hang together, or hang together far from there, climbs around one do not
 // see how deep the others are.
 TEST(Contacts, TheDepthIsThatOfTheDeepestPart) {
@@ -618,24 +617,29 @@ TEST(Contacts, TheDepthIsThatOfTheDeepestPart) {
     }
 }
 
+// Of these trees some leaves lie above the last level: among the nodes that meet are some with triangles, and others,
+// and of the other tree none has any.
 TEST(Contacts, ALevelMayCutWhereSomeNodesAreLeaves) {
     const scenes::ExactScene scene =
         scenes::exact_tree(shapes::torus(1, 0.3f, 37, 17), {.degree = 5, .leaf_triangles = 2});
     const TreeView torus = *TreeView::open(scene.bytes);
     Random random(11);
+    const scenes::Scene cover = scenes::tree(random, scenes::cloud(random, 600), {.degree = 5});
     const auto context = std::make_unique<QueryContext>();
-    uint64_t most = 0;
-    for (int i = 0; i < 200; ++i) {
-        const Pose pose = scenes::pose_at(random, random.in(0, 1));
-        for (uint32_t level = 0; level < torus.level_count(); ++level) {
-            ContactManifolds m;
-            const ContactResult r = contacts(torus, {}, torus, pose, m, *context, {.max_level = level});
-            EXPECT_EQ(r.verdict, collide(torus, {}, torus, pose, *context, {.max_level = level}).verdict);
-            EXPECT_EQ(m.count > 0, r.found > 0);
-            most = std::max(most, r.found);
+    for (const TreeView& other : {torus, *TreeView::open(cover.bytes)}) {
+        uint64_t most = 0;
+        for (int i = 0; i < 200; ++i) {
+            const Pose pose = scenes::pose_at(random, random.in(0, 1));
+            for (uint32_t level = 0; level < torus.level_count(); ++level) {
+                ContactManifolds m;
+                const ContactResult r = contacts(torus, {}, other, pose, m, *context, {.max_level = level});
+                EXPECT_EQ(r.verdict, collide(torus, {}, other, pose, *context, {.max_level = level}).verdict);
+                EXPECT_EQ(m.count > 0, r.found > 0);
+                most = std::max(most, r.found);
+            }
         }
+        EXPECT_GT(most, query::kMany);
     }
-    EXPECT_GT(most, query::kMany);
 }
 
 TEST(Contacts, ACubeOnItsCorner) {
