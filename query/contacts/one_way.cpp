@@ -158,6 +158,9 @@ bool OneWay::confirm_inside() noexcept {
     const TouchingBodies::Inside inside = bodies_.deepest_inside(from, way_, [this](const Contact& c) { take(c); });
     points_.deepen(std::min(inside.overlap, kBeside * points_.depth()));
     way_.depth = points_.depth();
+    if (way_.depth > shortest_ + bodies_.same_point)
+        return false; // than along the mean, from which this one was turned
+    shortest_ = way_.depth;
     bears_ = inside.face;
     if (bears_ == dvec3(0)) { // points of pairs are the deepest
         FacesMean there;

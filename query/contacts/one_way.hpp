@@ -61,8 +61,9 @@ private:
     FacesMean faces_;
     glm::dvec3 bears_{0, 0, 0};
     uint32_t turns_ = 0;
-    double own_ = HUGE_VAL;     // least overlap that a pair has by itself
-    double beside_ = -HUGE_VAL; // most overlap of pairs that have no points
+    double own_ = HUGE_VAL;      // least overlap that a pair has by itself
+    double shortest_ = HUGE_VAL; // depth of the last direction that is not by climbs
+    double beside_ = -HUGE_VAL;  // most overlap of pairs that have no points
 };
 
 } // namespace prolate::query
