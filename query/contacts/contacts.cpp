@@ -80,6 +80,7 @@ public:
 
     // After the search, which found these pairs first.
     void finish(std::span<const MeetingPair> first) {
+        met_ = true, first_ = first[0];
         if (phase_ == Phase::seek && !begin_one_way(first)) again(Phase::normals, first);
         if (phase_ == Phase::one_way) {
             if (in_one_way(first)) return;
@@ -95,7 +96,7 @@ public:
         uint32_t count = 0;
         for (uint32_t i = 0; i < way_count_; ++i)
             if (!points_[i].empty()) out[count++] = &points_[i];
-        if (count > 0 || search_.found == 0) return count;
+        if (count > 0 || !met_) return count; // a later search may find none within the budget
         const Contact c = pairs_.last_resort(first_);
         points_[0] = Patch(c.normal);
         add_to(points_[0], c.normal, c);
@@ -210,7 +211,6 @@ private:
     // ---- the first pass ----
 
     void add_normals(const MeetingPair& pair, uint64_t number) {
-        if (number == 0) first_ = pair;
         KnownOverlap known;
         patches_.for_each([&](const Patch& p) {
             if (p.overlap() < known.overlap && pairs_.resolves(p.normal(), p.overlap(), pair))
@@ -335,8 +335,9 @@ private:
     const PairContacts pairs_;
     const Candidates candidates_;
     OneWay one_way_;
-    MeetingPair first_;
-    Patches patches_; // of the first pass, for their normals
+    bool met_ = false;
+    MeetingPair first_; // that met
+    Patches patches_;   // of the first pass, for their normals
     static constexpr uint32_t kWaiting = 128;
     // Of edges, corners and closest points, in the first pass. Ellipsoids have none: then the contact of each pair, for
     // the second.

@@ -600,6 +600,29 @@ TEST(Contacts, ABudgetBoundsTriangleTestsToo) {
     }
 }
 
+// The budget may end a later search before its first pair: what met in the first one is a point all the same.
+TEST(Contacts, WhatMeetsHasAPointWithAnyBudget) {
+    const Solid ring = exact(shapes::torus(1, 0.3f, 40, 20), false), ball = exact(shapes::icosphere(3));
+    Random random(12);
+    QueryContext context;
+    int overlapping = 0;
+    for (const Solid* other : {&ring, &ball})
+        for (int i = 0; i < 20; ++i) {
+            const Pose pose = scenes::pose_at(random, random.in(0.2, 1.5));
+            ContactManifolds m;
+            const ContactResult whole = contacts(ring.view(), {}, other->view(), pose, m, context);
+            for (uint64_t part = 1; part < 40; ++part) {
+                const QueryOptions options{.max_pair_tests = whole.stats.tests() * part / 40};
+                const ContactResult r = contacts(ring.view(), {}, other->view(), pose, m, context, options);
+                if (r.verdict != Verdict::overlapping || r.enclosed) continue;
+                ++overlapping;
+                ASSERT_GE(m.count, 1u) << i << ' ' << part;
+                ASSERT_GE(m.manifolds[0].count, 1u);
+            }
+        }
+    EXPECT_GT(overlapping, 100);
+}
+
 // Where a body touches with parts that do not hang together, or hang together far from there, climbs around one do not
 // see how deep the others are.
 TEST(Contacts, TheDepthIsThatOfTheDeepestPart) {
