@@ -15,8 +15,8 @@ namespace {
 constexpr double kBesideMargin = 1.2; // ellipsoids whose boxes, so much larger, meet may come to touch in a trial
 constexpr size_t kBatch = 4;          // places that are tried at the same time, at most: they are apart
 
-// Ellipsoids that descend together, and what they see.
-struct Neighbourhood {
+// Ellipsoids that descend together, what they see, and what they come to.
+struct Trial {
     std::vector<uint32_t> chosen, beside; // of the set
     uint64_t seed;
     std::vector<Fit> fits; // of the chosen ones
@@ -33,9 +33,9 @@ public:
 
     void run() {
         for (int done = 0; done < options_.trials;) {
-            std::vector<Neighbourhood> batch = next_batch(static_cast<size_t>(options_.trials - done));
+            std::vector<Trial> batch = next_batch(static_cast<size_t>(options_.trials - done));
             parallel_for(size_t{0}, batch.size(), [&](size_t b) { descend_again(batch[b]); });
-            for (const Neighbourhood& place : batch) keep_if_better(place);
+            for (const Trial& place : batch) keep_if_better(place);
             done += static_cast<int>(batch.size());
             if (options_.progress) options_.progress(static_cast<double>(done) / options_.trials);
         }
@@ -49,12 +49,12 @@ private:
         return order_[turn_];
     }
 
-    std::vector<Neighbourhood> next_batch(size_t most) {
+    std::vector<Trial> next_batch(size_t most) {
         const std::vector<std::vector<uint32_t>> neighbours = neighbours_of(fits_, kBesideMargin);
         std::vector<bool> moving(fits_.size(), false), seen(fits_.size(), false);
-        std::vector<Neighbourhood> out;
+        std::vector<Trial> out;
         while (out.size() < std::min(kBatch, most)) {
-            Neighbourhood place = place_around(center(), neighbours);
+            Trial place = place_around(center(), neighbours);
             const auto in = [](const std::vector<uint32_t>& some, const std::vector<bool>& marked) {
                 return std::ranges::any_of(some, [&](uint32_t i) { return marked[i]; });
             };
@@ -69,7 +69,7 @@ private:
     }
 
     // The ellipsoid and those neighbours that are most in the middle of it, or it of them.
-    Neighbourhood place_around(uint32_t center, const std::vector<std::vector<uint32_t>>& neighbours) const {
+    Trial place_around(uint32_t center, const std::vector<std::vector<uint32_t>>& neighbours) const {
         std::vector<std::pair<double, uint32_t>> near;
         for (const uint32_t other : neighbours[center]) {
             const double there = fits_[center].radial_squared(fits_[other].center),
@@ -78,7 +78,7 @@ private:
         }
         std::ranges::sort(near);
         near.resize(std::min(near.size(), options_.size - 1));
-        Neighbourhood out;
+        Trial out;
         out.chosen.push_back(center);
         for (const auto& [radial, other] : near) out.chosen.push_back(other);
         for (const uint32_t i : out.chosen) {
@@ -91,7 +91,7 @@ private:
         return out;
     }
 
-    void descend_again(Neighbourhood& place) const {
+    void descend_again(Trial& place) const {
         std::vector<Fit> fixed;
         for (const uint32_t i : place.beside) fixed.push_back(fits_[i]);
         const auto [points, owner] = points_of(place, fixed);
@@ -101,8 +101,7 @@ private:
     }
 
     // The points that are the place's to cover, and which of its ellipsoids has each most centrally.
-    std::pair<std::vector<Vec>, std::vector<uint32_t>> points_of(const Neighbourhood& place,
-                                                                 std::span<const Fit> fixed) const {
+    std::pair<std::vector<Vec>, std::vector<uint32_t>> points_of(const Trial& place, std::span<const Fit> fixed) const {
         Box box;
         for (const Fit& fit : place.fits) {
             const Vec half = kBesideMargin * fit.half_extents();
@@ -122,7 +121,7 @@ private:
         return out;
     }
 
-    void keep_if_better(const Neighbourhood& place) {
+    void keep_if_better(const Trial& place) {
         std::vector<Fit> next = fits_;
         for (size_t k = 0; k < place.chosen.size(); ++k) next[place.chosen[k]] = place.fits[k];
         const double error = options_.error(next);
