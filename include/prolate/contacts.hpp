@@ -92,7 +92,7 @@ struct ContactResult {
 ///
 /// Of closed bodies one way out of all pairs is sought first (query/contacts/one_way.hpp): one manifold, whose deepest
 /// point has its length for a depth, though facets may be nearer there. Without one, pairs are gone through as above;
-/// the search then runs two or three times, which counters and options.max_pair_tests count as one.
+/// the search then runs two to five times, which counters and options.max_pair_tests count as one.
 ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b, const Pose& pose_b,
                        ContactManifolds& manifolds, Scratch context, const QueryOptions& options = {}) noexcept;
 
