@@ -38,7 +38,11 @@ struct LeafDistance {
 struct NearLimit {
     double distance = std::numeric_limits<double>::infinity(); // those that are nearer, metres,
     double absolute = 0, relative = 0; // and than the nearest so far by this, or this share of its distance
-    void lower(double upper) { distance = std::min(distance, upper - std::max(absolute, relative * upper)); }
+    /// Stays above 0: pairs that may meet always matter.
+    void lower(double upper) {
+        const double improving = upper - std::max(absolute, relative * upper);
+        distance = std::min(distance, std::max(improving, std::numeric_limits<double>::min()));
+    }
 };
 /// Pairs that do not matter may be left out: if all are, nearest.upper is infinite. Ends with the first pair whose
 /// lower bound is 0, which is then `nearest`. `normal`, a unit vector or 0, in A's frame: along it the triangles may

@@ -269,6 +269,29 @@ TEST(Agreement, OfDistancesFarApart) {
 }
 
 // A prefix of a tree is one of its own: its leaves are its last level.
+// Within a tolerance of the nearest pair found, others of the same leaves may still meet: needles in plates.
+TEST(Agreement, OfDistancesWithLargeTolerances) {
+    Mesh needle = shapes::icosphere(2);
+    for (Vec3& v : needle.vertices) v.x *= 0.01f, v.y *= 0.01f;
+    const scenes::ExactScene of_a = scenes::exact_tree(needle),
+                             of_b = scenes::exact_tree(shapes::moved(shapes::box(2, 2, 0.05f), {-1, -1, -0.025f}));
+    const TreeView a = *TreeView::open(of_a.bytes), b = *TreeView::open(of_b.bytes);
+    scenes::Random random(19);
+    const auto context = std::make_unique<QueryContext>();
+    int meeting = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const Pose pose_a = scenes::pose_at(random, random.in(0, 1.5)), pose_b = scenes::pose_at(random, 0);
+        const Verdict truth = collide(a, pose_a, b, pose_b, *context).verdict;
+        meeting += truth == Verdict::overlapping;
+        for (const DistanceOptions& options :
+             {DistanceOptions{.tolerance_absolute = 0.02}, DistanceOptions{.tolerance_absolute = 10},
+              DistanceOptions{.tolerance_relative = 1}})
+            ASSERT_EQ(distance(a, pose_a, b, pose_b, *context, options).verdict, truth) << i;
+    }
+    EXPECT_GT(meeting, 500);
+    EXPECT_LT(meeting, 1500);
+}
+
 TEST(Agreement, OfPrefixes) {
     std::vector<Body> cut;
     for (const Body& whole : covers()) {
