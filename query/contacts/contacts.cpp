@@ -45,7 +45,7 @@ constexpr double kSamePoint = 1e-4;   // of the smaller body: what is nearer is 
 constexpr double kLeastWeight = 1e-7; // of the smaller body: a normal's weight in the mean, if its pair has no depth
 constexpr uint64_t kTries = 32, kFewResolved = 8; // pairs of nodes; of so many, one has the normal of a patch
 // Shares of a patch's extent: points that lie farther out by less do not matter, to its normal and to its outline.
-constexpr double kFarther = 0x1p-6, kFartherOut = 0x1p-10;
+constexpr double kFarther = 0x1p-6, kFartherOut = 0x1p-8;
 constexpr double kSlack = 0.25; // of a depth: the normals of curved bodies are means, and no exact ones
 
 double smaller_size(const CollideSearch& search) {
@@ -193,7 +193,7 @@ private:
 
     bool begin_one_way(std::span<const MeetingPair> some) {
         if (!one_way_.begin(some)) return false;
-        phase_ = Phase::one_way, way_count_ = 1, reduce_ = true;
+        phase_ = Phase::one_way, way_count_ = 1, reduce_ = search_.found >= many_;
         for (const MeetingPair& pair : some) one_way_.add(pair);
         return true;
     }

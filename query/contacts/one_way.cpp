@@ -84,7 +84,8 @@ bool OneWay::begin(std::span<const MeetingPair> some) noexcept {
     }
     if (from == nullptr) return false;
     const Way way = bodies_.shortest_way(best.normal, *from, HUGE_VAL);
-    if (own_ < kOwnShorter * way.depth - bodies_.same_point)
+    const double share = way.depth > 0 ? kOwnShorter : 1; // below 0 bodies are apart
+    if (own_ < share * way.depth - bodies_.same_point)
         start({mean, HUGE_VAL}, false), ++turns_;
     else
         start(way, true);

@@ -94,10 +94,11 @@ class TwoTrees(QueryTest):
             command = json.loads(told.stdout)
             self.assertEqual(page["verdict"], command["verdict"])
             self.assertEqual((page["pairTests"], page["blockTests"]), (command["pair_tests"], command["block_tests"]))
-            # What each level adds makes up the whole; a search that stops at the first pair tests less.
+            # What each level adds makes up the whole; a search that stops at the first pair tests less, and so does one
+            # that the spheres around the roots settle.
             tests = sum(level["own"] for level in page["levels"])
             self.assertEqual(len(page["levels"]), 4)
-            if page["verdict"] == "separated":
+            if page["verdict"] == "separated" and command["block_tests"] > 0:
                 self.assertEqual(tests, command["pair_tests"])
             else:
                 self.assertGreaterEqual(tests, command["pair_tests"])
