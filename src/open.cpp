@@ -479,14 +479,13 @@ Result<void> TreeView::open_nodes(uint32_t present, bool exact, bool check_hash)
         above = level;
     }
     level_count_ = present;
-    root_ = ellipsoid(0);
     if (!exact) {
         raw_.bounding_blocks_ = h + bounding;
         raw_.bounding_count_ = first_slot(present - 1) / kBlockLanes;
         for (uint32_t b = 0; b < raw_.bounding_count_; ++b)
             if (const auto sound = check.bounding_block(b, bounding + size_t{b} * kBlockBytes); !sound) return sound;
     }
-    root_bound_ = bound(0);
+    find_root();
     const uint32_t triangle_count = load_le<uint32_t>(h + kAtTriangleCount);
     if (check.triangles() > triangle_count || (present == level_count && check.triangles() != triangle_count))
         return bad("the leaves do not share out the triangles", kAtTriangleCount);
@@ -522,6 +521,7 @@ Result<void> TreeView::open_triangles(size_t hulls, bool check_hash) noexcept {
             if (corner >= vertex_count_)
                 return bad("a triangle names a vertex that does not exist",
                            static_cast<size_t>(raw_.triangles_ - h) + size_t{t} * 3 * index_bytes(vertex_count_));
+    find_root();
     return {};
 }
 

@@ -69,8 +69,72 @@ TreeView TreeView::coarser(uint32_t last) const noexcept {
     out.raw_.has_slabs_ = false;
     out.vertex_count_ = out.triangle_count_ = out.component_count_ = 0;
     out.count_levels(last + 1);
-    out.root_bound_ = out.bound(0);
+    out.find_root();
     return out;
+}
+
+namespace {
+
+// A bound on the longest radius of the ellipsoid of which the squared lengths of the factor's rows add up to `trace`.
+// With M = L L^T / trace, it is the root of trace times the largest eigenvalue of M, which is no larger than the eighth
+// root of the Frobenius norm of M^8, and at least 0.93 of that.
+double longest_radius(const Ellipsoid& e, double trace) {
+    const double l[3][3] = {{e.l11, 0, 0}, {e.l21, e.l22, 0}, {e.l31, e.l32, e.l33}};
+    std::array<double, 6> m; // xx, xy, yy, xz, yz, zz
+    for (size_t i = 0, at = 0; i < 3; ++i)
+        for (size_t j = 0; j <= i; ++j) m[at++] = (l[i][0] * l[j][0] + l[i][1] * l[j][1] + l[i][2] * l[j][2]) / trace;
+    for (int power = 1; power < 8; power *= 2) {
+        const auto [xx, xy, yy, xz, yz, zz] = m;
+        m = {xx * xx + xy * xy + xz * xz, xx * xy + xy * yy + xz * yz, xy * xy + yy * yy + yz * yz,
+             xx * xz + xy * yz + xz * zz, xy * xz + yy * yz + yz * zz, xz * xz + yz * yz + zz * zz};
+    }
+    const auto [xx, xy, yy, xz, yz, zz] = m;
+    const double norm = std::sqrt(xx * xx + yy * yy + zz * zz + 2 * (xy * xy + xz * xz + yz * yz));
+    return std::sqrt(trace * std::sqrt(std::sqrt(std::sqrt(norm))));
+}
+
+detail::RootVolume volume_of(const Ellipsoid& e) {
+    detail::RootVolume out;
+    const double center[3] = {e.center.x, e.center.y, e.center.z};
+    const double square[3] = {double{e.l11} * e.l11, double{e.l21} * e.l21 + double{e.l22} * e.l22,
+                              double{e.l31} * e.l31 + double{e.l32} * e.l32 + double{e.l33} * e.l33};
+    for (size_t i = 0; i < 3; ++i) out.center[i] = center[i], out.half[i] = std::sqrt(square[i]);
+    out.radius = longest_radius(e, square[0] + square[1] + square[2]);
+    return out;
+}
+
+detail::RootVolume volume_of_vertices(const TreeView& tree) {
+    double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+    const auto for_each = [&tree](auto&& visit) {
+        for (uint32_t v = 0; v < tree.vertex_count(); ++v) {
+            const Vec3 p = tree.vertex(v);
+            const double at[3] = {p.x, p.y, p.z};
+            visit(at);
+        }
+    };
+    for_each([&](const double(&p)[3]) {
+        for (size_t i = 0; i < 3; ++i) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+    });
+    detail::RootVolume out;
+    for (size_t i = 0; i < 3; ++i) out.center[i] = 0.5 * (low[i] + high[i]), out.half[i] = 0.5 * (high[i] - low[i]);
+    double farthest = 0;
+    for_each([&](const double(&p)[3]) {
+        double square = 0;
+        for (size_t i = 0; i < 3; ++i) square += (p[i] - out.center[i]) * (p[i] - out.center[i]);
+        farthest = std::max(farthest, square);
+    });
+    out.radius = std::sqrt(farthest);
+    return out;
+}
+
+} // namespace
+
+// What is known of the root at once. Takes the vertices, if there are any, to be checked.
+void TreeView::find_root() noexcept {
+    root_ = ellipsoid(0), root_bound_ = bound(0);
+    detail::RootVolume& root = raw_.root_;
+    root = has_triangles() ? volume_of_vertices(*this) : volume_of(root_bound_);
+    root.reach = std::hypot(root.center[0], root.center[1], root.center[2]) + root.radius;
 }
 
 // With the first `count` levels.
@@ -92,8 +156,7 @@ TreeView TreeView::of_checked(std::span<const std::byte> bytes) noexcept {
     const auto bounding = load_le<uint32_t>(h + kHeaderBytes + (levels - 1) * kLevelBytes + kLevelFirstBlock);
     out.raw_.blocks_ = h + static_cast<size_t>(end_of_blocks(levels, bounding));
     out.count_levels(levels);
-    out.root_ = out.ellipsoid(0);
-    out.root_bound_ = out.bound(0);
+    out.find_root();
     return out;
 }
 

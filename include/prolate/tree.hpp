@@ -211,6 +211,7 @@ private:
     Result<void> open_skin(std::span<const std::byte> content, size_t at) noexcept;
     static TreeView of_checked(std::span<const std::byte> bytes) noexcept;
     void count_levels(uint32_t count) noexcept;
+    void find_root() noexcept;
     template <class Visit> void for_each_node_in(uint32_t begin, uint32_t end, Visit&& visit) const {
         for (uint32_t slot = begin; slot < end; ++slot)
             if (is_node(slot)) visit(slot);

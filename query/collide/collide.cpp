@@ -4,8 +4,6 @@
 #include "query/collide/search.hpp"
 #include "query/inside/enclosure.hpp"
 #include "query/node/scratch.hpp"
-#include "src/block_box.hpp"
-#include "src/lattice.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -21,22 +19,17 @@ double gap_of_flat_roots(const TreeView& a, const TreeView& b, const query::Rela
     return a.raw().has_slabs() && b.raw().has_slabs() ? query::gap_of_roots(a, b, b_to_a, margin) : -HUGE_VAL;
 }
 
-// The box of a root, metres.
-struct RootBox {
-    glm::dvec3 center, half;
+// What holds a tree's root, metres, as queries see it.
+struct Root {
+    glm::dvec3 center, half; // of a box
+    double radius, reach;    // of a ball about the same center; how far it reaches from the origin
 };
-RootBox box_of_root(const TreeView& tree) {
-    const LatticeInfo lattice = tree.raw().lattice();
-    const BlockBoxes boxes(tree.raw().bounding_block(0));
-    const double step = step_of(lattice);
-    RootBox out;
-    for (size_t i = 0; i < 3; ++i) {
-        const auto axis = static_cast<glm::length_t>(i);
-        const double origin = static_cast<double>(lattice.origin[i]) + boxes.origin(i), half_step = boxes.half_step(i);
-        out.center[axis] = (origin + (boxes.low(i, 0) + boxes.high(i, 0)) * half_step) * step;
-        out.half[axis] = (boxes.high(i, 0) - boxes.low(i, 0)) * half_step * step;
-    }
-    return out;
+Root root_of(const TreeView& tree) {
+    const detail::RootVolume& root = tree.raw().root();
+    const auto& [center, radius, half, reach] = root;
+    const double scale = tree.scale();
+    return {glm::dvec3(center[0], center[1], center[2]) * scale, glm::dvec3(half[0], half[1], half[2]) * scale,
+            radius * scale, reach * scale};
 }
 
 // ---- coherence ----
@@ -87,27 +80,27 @@ bool query::names_leaves(const MeetingPair& pair, const TreeView& a, const TreeV
 }
 
 double query::gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
-    const PlacedEllipsoid root_a = place(a.root_bound(), a.scale()), root_b = place(b.root_bound(), b.scale());
+    const Root root_a = root_of(a), root_b = root_of(b);
     const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
-    return glm::distance(root_a.center, center_b) - root_a.size - root_b.size -
+    return glm::distance(root_a.center, center_b) - root_a.radius - root_b.radius -
            kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
 }
 
 // Six of the fifteen axes of S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree: a hierarchical structure for rapid
 // interference detection", SIGGRAPH 1996.
 double query::gap_of_boxes(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
-    const RootBox box_a = box_of_root(a), box_b = box_of_root(b);
+    const Root root_a = root_of(a), root_b = root_of(b);
     const glm::dmat3& to_a = b_to_a.rotation;
-    const glm::dvec3 between = to_a * box_b.center + b_to_a.translation - box_a.center, seen_by_b = between * to_a;
+    const glm::dvec3 between = to_a * root_b.center + b_to_a.translation - root_a.center, seen_by_b = between * to_a;
     double gap = -HUGE_VAL, reach = b_to_a.distance;
     for (glm::length_t i = 0; i < 3; ++i) {
-        double half_b = box_a.half[i], half_a = box_b.half[i]; // what both boxes take along the side of either
+        double half_b = root_a.half[i], half_a = root_b.half[i]; // what both boxes take along the side of either
         for (glm::length_t k = 0; k < 3; ++k) {
-            half_b += std::abs(to_a[k][i]) * box_b.half[k];
-            half_a += std::abs(to_a[i][k]) * box_a.half[k];
+            half_b += std::abs(to_a[k][i]) * root_b.half[k];
+            half_a += std::abs(to_a[i][k]) * root_a.half[k];
         }
         gap = std::max(gap, std::max(std::abs(between[i]) - half_b, std::abs(seen_by_b[i]) - half_a));
-        reach += std::abs(box_a.center[i]) + box_a.half[i] + std::abs(box_b.center[i]) + box_b.half[i];
+        reach += std::abs(root_a.center[i]) + root_a.half[i] + std::abs(root_b.center[i]) + root_b.half[i];
     }
     return gap - kSeparationMargin * reach;
 }
@@ -171,9 +164,8 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     };
     double moved = 0, smaller = 0;
     if (cache) {
-        const query::PlacedEllipsoid root_a = query::place(a.root_bound(), a.scale()),
-                                     root_b = query::place(b.root_bound(), b.scale());
-        smaller = std::min(root_a.size, root_b.size);
+        const Root root_a = root_of(a), root_b = root_of(b);
+        smaller = std::min(root_a.radius, root_b.radius);
         if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b.reach);
         if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)
             return {.verdict = Verdict::separated, .pair = {}, .stats = {}};

@@ -120,7 +120,7 @@ TEST(Bits, ScenesAreNeitherAllApartNorAllMeeting) {
 }
 
 TEST(Bits, Collide) {
-    expect_bits(3568779675288151254u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(9749661599211173981u, [](Bits& bits, const Scenes::Pair& p) {
         const CollideResult r = collide(p.a, p.pose_a, p.b, p.pose_b, context());
         bits.add_all(r.verdict, r.enclosed, r.pair, r.stats);
         PairCache cache;

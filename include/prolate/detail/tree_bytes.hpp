@@ -22,6 +22,14 @@ struct LatticeInfo {
 
 namespace detail {
 
+/// A ball and a box about one center that hold all leaf ellipsoids, or if TreeView::has_triangles() all triangles: what
+/// queries ask first. Metres, as stored, not rounded outward: double precision, and queries pay for that.
+struct RootVolume {
+    double center[3] = {}, radius = 0; ///< of the ball
+    double half[3] = {};               ///< sides of the box, halved
+    double reach = 0;                  ///< no point of the ball is farther from the origin
+};
+
 /// Pointers into the bytes that TreeView::open() has checked; src/FORMAT.md describes what they point at.
 class TreeBytes {
 public:
@@ -38,6 +46,10 @@ public:
     const std::byte* bounding_block(uint32_t b) const noexcept {
         return (b < bounding_count_ ? bounding_blocks_ : blocks_) + size_t{b} * kBlockBytes;
     }
+
+    /// Found by open(). Of triangles the box is the smallest, and the ball the smallest about its center; else both are
+    /// the smallest around root_bound(), the ball within 4 %.
+    const RootVolume& root() const noexcept { return root_; }
 
     /// Of a tree with triangles: the kHullBytes bytes of the polytope that holds the triangles below an inner node.
     /// `b` is the block of the node's first child.
@@ -61,6 +73,7 @@ private:
     const std::byte* triangles_ = nullptr; // null without triangles
     bool has_slabs_ = false;
     LatticeInfo lattice_;
+    RootVolume root_;
 };
 
 } // namespace detail

@@ -1,6 +1,8 @@
 // Tree against tree: what the traversal promises, on synthetic trees over point clouds.
+#include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
+#include "tests/shapes.hpp"
 
 #include <prolate/collide.hpp>
 #include <prolate/pairs.hpp>
@@ -348,6 +350,39 @@ TEST(Collide, OpenAllocatesNothing) {
     const uint64_t before = g_allocations;
     for (const Scene& scene : trees) ASSERT_TRUE(TreeView::open(scene.bytes));
     EXPECT_EQ(g_allocations, before);
+}
+
+// What queries ask of a tree first, but for rounding: ball and box hold what is below the root, and little else.
+TEST(Collide, RootVolumesAreTight) {
+    constexpr double kOne = 1 + 1e-12;
+    for (const Scene& scene : zoo()) {
+        const TreeView tree = view(scene);
+        const detail::RootVolume& root = tree.raw().root();
+        const Ellipsoid& e = tree.root_bound();
+        const double longest = principal_axes(e).radii[0];
+        ASSERT_GE(root.radius * kOne, longest);
+        ASSERT_LE(root.radius, 1.036 * longest);
+        ASSERT_EQ(Point({root.center[0], root.center[1], root.center[2]}), Point({e.center.x, e.center.y, e.center.z}));
+        ASSERT_DOUBLE_EQ(root.half[0], e.l11);
+        ASSERT_DOUBLE_EQ(root.half[1], std::hypot(double{e.l21}, double{e.l22}));
+        ASSERT_DOUBLE_EQ(root.half[2], std::hypot(double{e.l31}, double{e.l32}, double{e.l33}));
+    }
+    for (const Vec3 offset : {Vec3{}, Vec3{3, -50, 0.1f}}) {
+        const scenes::ExactScene scene = scenes::exact_tree(shapes::moved(shapes::torus(1, 0.3f, 16, 8), offset));
+        const detail::RootVolume root = TreeView::open(scene.bytes)->raw().root();
+        double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}, farthest = 0;
+        for (const Vec3& v : scene.mesh.vertices) {
+            const double p[] = {v.x, v.y, v.z};
+            for (size_t i = 0; i < 3; ++i) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
+            farthest =
+                std::max(farthest, std::hypot(p[0] - root.center[0], p[1] - root.center[1], p[2] - root.center[2]));
+        }
+        for (size_t i = 0; i < 3; ++i) {
+            ASSERT_EQ(root.center[i] - root.half[i], low[i]);
+            ASSERT_EQ(root.center[i] + root.half[i], high[i]);
+        }
+        ASSERT_DOUBLE_EQ(root.radius, farthest);
+    }
 }
 
 TEST(Collide, CountsItsWork) {
