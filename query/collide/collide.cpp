@@ -36,7 +36,7 @@ Root root_of(const TreeView& tree) {
 
 // Near contact a skin costs more than the queries that it spares, unless the motion is small beside the gap. So there
 // is one, somewhat thicker than the last motion, that a steady one be spared every other query, where that was small or
-// the last skin nearly sufficed for it (./run solids, "moving"). Lengths are shares of the smaller root's.
+// the last skin nearly sufficed for it (bench_moving). Lengths are shares of the smaller root's.
 constexpr double kFirstSkin = 0x1p-8, kThinnestSkin = 0x1p-12, kSmallMotion = 0x1p-11, kLargestMotion = 0x1p-5;
 constexpr double kBeyondMotion = 1.1, kNearlySufficed = 0.6;
 constexpr double kRoundDown = 1 - 0x1p-20; // more than the rounding of a float
@@ -163,10 +163,10 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
                   .pose_b = pose_b};
     };
     double moved = 0, smaller = 0;
-    if (cache) {
+    if (cache && cache->verdict != Verdict::overlapping) {
         const Root root_a = root_of(a), root_b = root_of(b);
         smaller = std::min(root_a.radius, root_b.radius);
-        if (cache->verdict != Verdict::undecided) moved = motion(*cache, pose_a, pose_b, root_b.reach);
+        if (cache->verdict == Verdict::separated) moved = motion(*cache, pose_a, pose_b, root_b.reach);
         if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)
             return {.verdict = Verdict::separated, .pair = {}, .stats = {}};
     }
