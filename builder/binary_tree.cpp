@@ -24,21 +24,28 @@ struct Cut {
     size_t group = 0;       // the first on the upper side
 };
 
-// The best cut between consecutive groups of triangles: `extents(g)` and `size(g)` of each. `right` is scratch.
+// The best cut between consecutive groups of triangles, if it costs less than `limit`: `extents(g)` and `size(g)` of
+// each. `right` is scratch. Either side's cost only grows with it, so that neither sweep goes on for long.
 template <class ExtentsOf, class SizeOf>
-Cut best_cut(size_t groups, std::span<double> right, ExtentsOf&& extents, SizeOf&& size) {
+Cut best_cut(size_t groups, double limit, std::span<double> right, ExtentsOf&& extents, SizeOf&& size) {
     Extents side;
     uint32_t count = 0;
-    for (size_t g = groups; g-- > 1;) { // cost of this group and all later ones
-        side.add(extents(g));
-        right[g] = (count += size(g)) * side.squared_width();
+    size_t first = groups; // below, the upper side alone costs too much
+    while (first > 1) {    // cost of this group and all later ones
+        side.add(extents(first - 1));
+        const double cost = (count += size(first - 1)) * side.squared_width();
+        if (cost >= limit) break;
+        right[--first] = cost;
     }
-    Cut best;
+    Cut best{.cost = limit};
     side = {}, count = 0;
     for (size_t g = 1; g < groups; ++g) {
         side.add(extents(g - 1));
-        const double cost = (count += size(g - 1)) * side.squared_width() + right[g];
+        count += size(g - 1);
+        if (g < first) continue;
+        const double left = count * side.squared_width(), cost = left + right[g];
         if (cost < best.cost) best = {cost, count, g};
+        if (left >= best.cost) break;
     }
     return best;
 }
@@ -141,7 +148,7 @@ uint32_t BinaryTree::cut_sorted(const Part& p, uint64_t most) {
         std::sort(keys.begin(), keys.begin() + size);
         if (axis == 0) longest = chosen = keys;
         const Cut cut = best_cut(
-            size, right, [&](size_t i) -> const Extents& { return extents[place_in(keys[i])]; },
+            size, best.cost, right, [&](size_t i) -> const Extents& { return extents[place_in(keys[i])]; },
             [](size_t) { return 1u; });
         if (cut.cost < best.cost) best = cut, chosen = keys;
     }
@@ -173,7 +180,7 @@ uint32_t BinaryTree::cut_binned(const Part& p, uint64_t most) {
         }
         std::vector<double> right(bin_of.count);
         cuts[axis] = best_cut(
-            bin_of.count, right, [&](size_t g) -> const Extents& { return bins[g]; },
+            bin_of.count, HUGE_VAL, right, [&](size_t g) -> const Extents& { return bins[g]; },
             [&](size_t g) { return sizes[g]; });
     };
     if (size > kParallelAbove)
@@ -206,7 +213,7 @@ uint32_t BinaryTree::cut_binned(const Part& p, uint64_t most) {
 Extents BinaryTree::split(uint32_t index, const Part& p, uint32_t levels) {
     Node& node = nodes_[index];
     node.part = p;
-    checkpoint();
+    if (p.size() > kSortedBelow) checkpoint(); // all below takes a millisecond
     Extents all;
     if (p.size() == 1) {
         all = extents_[p.begin];
