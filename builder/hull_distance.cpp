@@ -106,11 +106,39 @@ private:
 
 } // namespace
 
+Simplex::Simplex(const HullDistance& hull, const Combination& of) : origin_(hull.point(of.corners[0])) {
+    for (size_t i = 1; i < of.count; ++i) edges_[i - 1] = hull.point(of.corners[i]) - origin_;
+    const auto& [d, e, f] = edges_;
+    const Vec n = d.cross(e);
+    if (of.count == 2) {
+        duals_[0] = d / d.squaredNorm();
+    } else if (of.count == 3) {
+        const double inverse = 1 / n.squaredNorm();
+        duals_[0] = e.cross(n) * inverse, duals_[1] = n.cross(d) * inverse;
+    } else if (of.count == 4) {
+        const double inverse = 1 / n.dot(f);
+        duals_[0] = e.cross(f) * inverse, duals_[1] = f.cross(d) * inverse, duals_[2] = n * inverse;
+    }
+}
+
 void HullDistance::add(const Vec& point) {
     for (size_t k = 0; k < 3; ++k)
         std::fill(lanes_[k].begin() + static_cast<std::ptrdiff_t>(size_), lanes_[k].end(),
                   static_cast<float>(point[static_cast<int>(k)]));
     ++size_;
+}
+
+bool HullDistance::near_point(const Vec& w, double distance) const {
+    constexpr double kRounding = 0x1p-20; // of floats here, more than enough
+    const auto x = static_cast<float>(w.x()), y = static_cast<float>(w.y()), z = static_cast<float>(w.z());
+    std::array<float, kHullPoints> squared;
+    for (size_t i = 0; i < kHullPoints; ++i) {
+        const float d = x - lanes_[0][i], e = y - lanes_[1][i], f = z - lanes_[2][i];
+        squared[i] = (d * d + e * e) + f * f;
+    }
+    for (size_t half = kHullPoints / 2; half > 0; half /= 2)
+        for (size_t i = 0; i < half; ++i) squared[i] = squared[half + i] < squared[i] ? squared[half + i] : squared[i];
+    return std::sqrt(double{squared[0]}) + kRounding * w.lpNorm<1>() <= distance * (1 - kRounding);
 }
 
 size_t HullDistance::farthest(const Vec& direction) const {

@@ -6,6 +6,7 @@
 #include "src/hull.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 namespace prolate {
@@ -27,6 +28,8 @@ public:
     /// near w, or of w when there were fewer points. Whatever it is, a combination is in the hull. Thread-safe.
     double operator()(const Vec& w, double enough, Combination& nearest) const;
 
+    /// Is w certainly at most so far from one of the points?
+    bool near_point(const Vec& w, double distance) const;
     /// The first of the points that are farthest along the direction, for all that floats tell.
     size_t farthest(const Vec& direction) const;
     Vec point(size_t i) const { return {lanes_[0][i], lanes_[1][i], lanes_[2][i]}; }
@@ -34,6 +37,25 @@ public:
 private:
     std::array<float, kHullPoints> lanes_[3]; // coordinates of the points; unused places repeat the last one
     size_t size_ = 0;
+};
+
+/// The points of a combination: whether others are near their hull, too, is told by a few products.
+class Simplex {
+public:
+    Simplex() = default; ///< near nothing
+    Simplex(const HullDistance& hull, const Combination& of);
+
+    /// Is x certainly, but for rounding, at most so far from their hull? False if x does not lie above its inside.
+    bool within(const Vec& x, double distance) const {
+        const Vec d = x - origin_;
+        const double a = duals_[0].dot(d), b = duals_[1].dot(d), c = duals_[2].dot(d);
+        if (!(a >= 0 && b >= 0 && c >= 0 && a + b + c <= 1)) return false;
+        return (d - (a * edges_[0] + b * edges_[1] + c * edges_[2])).squaredNorm() <= distance * distance;
+    }
+
+private:
+    Vec origin_ = Vec::Constant(HUGE_VAL);
+    Vec edges_[3] = {Vec::Zero(), Vec::Zero(), Vec::Zero()}, duals_[3] = {Vec::Zero(), Vec::Zero(), Vec::Zero()};
 };
 
 } // namespace prolate

@@ -315,6 +315,16 @@ Hull::Hull(const std::byte* record) : share(load_le<uint8_t>(record + kHullShare
     }
 }
 
+double Hull::distance(const Vec& w, double enough) {
+    const Vec at = kHullUnit * w;
+    const double most = kHullUnit * enough;
+    const auto around = [&](const Simplex& simplex) { return simplex.within(at, most); };
+    if (enough >= 0 && (points_.near_point(at, most) || std::any_of(near_.begin(), near_.end(), around))) return enough;
+    const double out = points_(at, most, last_);
+    near_[oldest_++ % near_.size()] = Simplex(points_, last_);
+    return out / kHullUnit;
+}
+
 std::vector<std::byte> hulls_of(const TreeView& tree, const ExactEffort& effort) {
     std::vector<std::byte> out(size_t{tree.block_count()} * kHullBytes);
     const Below below(tree);

@@ -10,6 +10,7 @@
 
 #include <prolate/tree.hpp>
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -23,15 +24,16 @@ class Hull {
 public:
     explicit Hull(const std::byte* record);
     /// HullDistance of w, in unit-ball coordinates of the node (Fit::radial).
-    double distance(const Vec& w, double enough) {
-        return points_(kHullUnit * w, kHullUnit * enough, last_) / kHullUnit;
-    }
+    double distance(const Vec& w, double enough);
 
     double share; ///< of the ellipsoid; 0: nothing is known
 
 private:
     HullDistance points_; // in units of 1 / kHullUnit, which floats hold
-    Combination last_;    // corners that are asked for one after the other are often near the same face
+    // Corners that are asked for one after the other are often near the same faces, or those of a moment ago.
+    Combination last_;
+    std::array<Simplex, 4> near_;
+    size_t oldest_ = 0;
 };
 
 } // namespace prolate
