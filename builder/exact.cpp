@@ -157,11 +157,12 @@ private:
 
     // ---- nodes ----
 
-    // Makes all below `node`, and `sketch` that of its corners.
+    // Makes all below `node`, and `sketch` that of its corners, if they are many.
     void grow(Node& node, Sketch& sketch) {
         checkpoint();
         const Opening& opening = openings_[node.binary];
         const uint32_t size = size_of(node.binary);
+        std::vector<Sketch> sketches; // of the children
         if (opening.lanes == 0) {
             node.packed.triangle_count = static_cast<uint8_t>(size);
             report(size);
@@ -169,25 +170,32 @@ private:
             add_siblings(node.children, BinaryTree::left_of(node.binary), opening.left_lanes);
             add_siblings(node.children, binary_.right_of(node.binary), uint32_t{opening.lanes} - opening.left_lanes);
             node.packed.child_count = static_cast<uint8_t>(node.children.size());
-            std::vector<Sketch> sketches(node.children.size());
+            sketches.resize(node.children.size());
             const auto grow_child = [&](size_t c) { grow(node.children[c], sketches[c]); };
             if (size > kParallelAbove)
                 parallel_for(size_t{0}, sketches.size(), grow_child);
             else
                 for (size_t c = 0; c < sketches.size(); ++c) grow_child(c);
-            for (const Sketch& s : sketches) sketch.add(s);
         }
-        const BinaryTree::Part part = binary_.nodes()[node.binary].part;
-        const std::vector<Vec> corners = corners_.of(part.begin, part.end);
-        if (opening.lanes == 0) sketch.add(corners);
+        const std::vector<Vec> corners = corners_of(node);
+        if (corners.size() >= sketch_directions().size()) {
+            for (size_t c = 0; c < sketches.size(); ++c)
+                sketches[c].empty() ? sketch.add(corners_of(node.children[c])) : sketch.add(sketches[c]);
+            if (sketches.empty()) sketch.add(corners);
+        }
         cover(node, corners, sketch);
     }
 
-    // The node's ellipsoid and box.
+    std::vector<Vec> corners_of(const Node& node) const {
+        const BinaryTree::Part part = binary_.nodes()[node.binary].part;
+        return corners_.of(part.begin, part.end);
+    }
+
+    // The node's ellipsoid and box. Of many corners, the sketch is the core of a fit.
     void cover(Node& node, std::span<const Vec> corners, const Sketch& sketch) {
         checkpoint();
-        const bool few = corners.size() < sketch.points().size();
-        std::vector<Vec> core = few ? std::vector(corners.begin(), corners.end()) : without_repeats(sketch.points());
+        std::vector<Vec> core =
+            sketch.empty() ? std::vector(corners.begin(), corners.end()) : without_repeats(sketch.points());
         const double tolerance = node.packed.child_count == 0 ? kLeafTolerance : options_.effort.tolerance;
         const double outside = 1 + 2 * tolerance; // squared radial coordinate from which a point calls for a refit
         Fit fit;
