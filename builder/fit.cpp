@@ -79,9 +79,11 @@ public:
         if (points.size() <= kFew) std::fill(weight_.begin(), weight_.end(), 1.0);
         for (const Vec& d : sketch_directions().first(points.size() <= kFew ? 0 : kDirections)) {
             size_t low = 0, high = 0;
+            double lowest = d.dot(points[0]), highest = lowest;
             for (size_t i = 1; i < points.size(); ++i) {
-                if (d.dot(points[i]) < d.dot(points[low])) low = i;
-                if (d.dot(points[i]) > d.dot(points[high])) high = i;
+                const double height = d.dot(points[i]);
+                if (height < lowest) low = i, lowest = height;
+                if (height > highest) high = i, highest = height;
             }
             weight_[low] = weight_[high] = 1;
         }
