@@ -46,7 +46,7 @@ constexpr double kShareRounding = 1e-9;
 class Reaches {
 public:
     explicit Reaches(size_t directions) : count_(std::min(directions, kMost)) {
-        up_.fill(key_of(-HUGE_VALF)), down_.fill(key_of(-HUGE_VALF));
+        up_.fill(key_of(-HUGE_VALF)), down_.fill(key_of(HUGE_VALF));
     }
     void add(const Vec& point, uint32_t name) {
         const auto x = static_cast<float>(point.x()), y = static_cast<float>(point.y()),
@@ -54,9 +54,9 @@ public:
         const Directions& along = directions();
         for (size_t d = 0; d < count_; ++d) {
             const float height = (along.x[d] * x + along.y[d] * y) + along.z[d] * z;
-            const int32_t up = key_of(height + 0.0f), down = key_of(0.0f - height); // never -0
-            highest_[d] = up > up_[d] ? name : highest_[d], up_[d] = std::max(up, up_[d]);
-            lowest_[d] = down > down_[d] ? name : lowest_[d], down_[d] = std::max(down, down_[d]);
+            const int32_t key = key_of(height + 0.0f); // never -0
+            highest_[d] = key > up_[d] ? name : highest_[d], up_[d] = key > up_[d] ? key : up_[d];
+            lowest_[d] = key < down_[d] ? name : lowest_[d], down_[d] = key < down_[d] ? key : down_[d];
         }
     }
     // Which of all points reaches farther than the others by most, if any does.
@@ -68,7 +68,7 @@ public:
         Farthest out;
         for (size_t d = 0; d < count_; ++d) {
             const float up = with_key(up_[d]) - with_key(others.up_[d]),
-                        down = with_key(down_[d]) - with_key(others.down_[d]);
+                        down = with_key(others.down_[d]) - with_key(down_[d]);
             if (up > out.by) out = {up, highest_[d]};
             if (down > out.by) out = {down, lowest_[d]};
         }
