@@ -1,5 +1,6 @@
 #include "builder/gradient_descent.hpp"
 
+#include "builder/border.hpp"
 #include "builder/central.hpp"
 #include "builder/job.hpp"
 #include "builder/random.hpp"
@@ -25,7 +26,8 @@ constexpr double kEarlyPull = 2, kAccumulateFrom = 0.3; // until then a penalty 
 constexpr double kMaxExcess = 0.3;                      // radial coordinates beyond 1 count no more than this
 constexpr int kNeighbourInterval = 8;                   // iterations between two searches for neighbours
 constexpr double kNeighbourMargin = 1.2;
-constexpr size_t kPointStride = 8;     // a covered point is looked at every so many iterations
+constexpr size_t kPointStride = 8; // a covered point is looked at every so many iterations
+constexpr size_t kPointChunk = 512 * kPointStride;
 constexpr double kRelocateUntil = 0.6; // share of the iterations
 constexpr int kRelocations = 20;       // rounds of relocation, were they made to the end
 constexpr double kUseless = 0.07; // relocated: what it alone covers is less than this much of what it goes to halve
@@ -43,13 +45,19 @@ Coordinates coordinates_of(const Vec& s, const Mat& g) {
     return {s.x(), s.y(), s.z(), g(0, 0), g(1, 1), g(2, 2), g(0, 1), g(0, 2), g(1, 2)};
 }
 
+// An uncovered point pulls its owner along s, and lengthens it by s y^T.
+struct Pulling {
+    uint32_t point;
+    Eigen::Vector3f s, y; // y: the point in the coordinates that make its owner the unit ball
+};
+
 class GradientDescent {
 public:
     GradientDescent(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
                     std::vector<uint32_t> owner, const DescentOptions& options)
         : fits_(fits), field_(field), points_(points), owner_(std::move(owner)), options_(options),
-          random_(options.seed), directions_(even_directions(options.directions)), rotated_(directions_.size()),
-          multiplier_(points.size(), 0), momentum_(fits_.size()), moving_(fits_.size()) {
+          random_(options.seed), border_(options.directions), multiplier_(points.size(), 0),
+          pulling_((points.size() + kPointChunk - 1) / kPointChunk), momentum_(fits_.size()), moving_(fits_.size()) {
         fits_.insert(fits_.end(), options.fixed.begin(), options.fixed.end());
     }
 
@@ -67,8 +75,7 @@ public:
                 find_lost_points();
             }
             schedule(t);
-            const Mat rotation = random_rotation(random_);
-            for (size_t d = 0; d < directions_.size(); ++d) rotated_[d] = rotation * directions_[d];
+            border_.turn(random_rotation(random_));
             update_points(static_cast<size_t>(iteration), t > kAccumulateFrom);
             parallel_for(size_t{0}, moving_, [&](size_t i) { next[i] = step(i); });
             fits_.swap(next);
@@ -93,56 +100,28 @@ private:
         step_ = kFirstStep * s * s * std::min(1.0, 10 / options_.first_kappa);
     }
 
-    // The neighbours that may hide some of ellipsoid i's border, those that reach deepest into it first. The others are
-    // beyond a plane between: that across the line of centers, in the coordinates that make i the unit ball.
-    std::vector<const Fit*> hiders_of(size_t i) const {
-        std::vector<std::pair<double, const Fit*>> near;
-        near.reserve(neighbours_[i].size());
-        const Fit& fit = fits_[i];
-        for (const uint32_t other : neighbours_[i]) {
-            const Vec y = fit.radial(fits_[other].center);
-            const double far = y.norm();
-            const Vec normal = fit.inverse.transpose() * y;
-            const double gap = far * far - (fits_[other].factor.transpose() * normal).norm() - far;
-            if (gap < 1e-9) near.emplace_back(far > 0 ? gap / far : -HUGE_VAL, &fits_[other]);
-        }
-        std::ranges::stable_sort(near, {}, &std::pair<double, const Fit*>::first);
-        std::vector<const Fit*> out;
-        out.reserve(near.size());
-        for (const auto& [gap, other] : near) out.push_back(other);
-        return out;
-    }
-
-    // Weight of the border point x, given what may hide it; `hint` is what hid the last one.
-    double weight(const std::vector<const Fit*>& hiders, const Vec& x, size_t& hint) const {
-        for (size_t n = 0; n < hiders.size(); ++n) {
-            const size_t at = n == 0 ? hint : n == hint ? 0 : n; // the hint first
-            if (hiders[at]->radial_squared(x) >= 1) continue;
-            hint = at;
-            return 0;
-        }
-        const double d = field_(x);
-        return d > 0 ? options_.objective(d) : -kappa_;
-    }
-
     Fit step(size_t i) {
         Vec s = Vec::Zero();
         Mat g = Mat::Zero();
-        size_t hint = 0;
         const Fit& fit = fits_[i];
-        const std::vector<const Fit*> hiders = hiders_of(i);
-        for (const Vec& u : rotated_) {
-            const double w = weight(hiders, fit.center + fit.factor * u, hint);
-            if (w == 0) continue;
+        const std::span<const Vec> directions = border_.directions();
+        std::vector<uint32_t> hidden(directions.size(), 0);
+        for (const uint32_t other : neighbours_[i])
+            if (may_hide(fit, fits_[other])) border_.hide(fit, fits_[other], hidden);
+        for (size_t n = 0; n < directions.size(); ++n) {
+            if (hidden[n]) continue;
+            const Vec& u = directions[n];
+            const double d = field_(fit.center + fit.factor * u), w = d > 0 ? options_.objective(d) : -kappa_;
             s += w * u;
             g += w * u * u.transpose();
         }
-        const double share = 3.0 / static_cast<double>(rotated_.size()); // of the ellipsoid's own volume
-        s = share * s - pull_[i].s;
-        g = share * g - pull_[i].g;
-        if (options_.primitive == Primitive::sphere) g = g.trace() / 3 * Mat::Identity();
-
-        const Coordinates gradient = coordinates_of(s, g);
+        const double share = 3.0 / static_cast<double>(directions.size()); // of the ellipsoid's own volume
+        Coordinates gradient = coordinates_of(share * s, share * g);
+        for (size_t k = 0; k < gradient.size(); ++k) gradient[k] -= pull_[i][k];
+        if (options_.primitive == Primitive::sphere) {
+            const double growth = (gradient[3] + gradient[4] + gradient[5]) / 3;
+            gradient = {gradient[0], gradient[1], gradient[2], growth, growth, growth};
+        }
         Momentum& m = momentum_[i];
         double square = 0;
         for (size_t k = 0; k < 9; ++k) {
@@ -161,36 +140,45 @@ private:
     void update_points(size_t iteration, bool accumulating) {
         const double rate = (accumulating ? options_.pull : kEarlyPull * kappa_) * static_cast<double>(moving_) /
                             static_cast<double>(std::max<size_t>(1, points_.size()));
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, points_.size(), 4096), [&](const auto& range) {
-            for (size_t p = range.begin(); p != range.end(); ++p) {
-                if (multiplier_[p] == 0 && (p + iteration) % kPointStride != 0) continue;
-                const double excess = std::min(find_owner(p) - 1, kMaxExcess);
-                const double before = accumulating ? double{multiplier_[p]} : 0;
-                multiplier_[p] = static_cast<float>(std::max(0.0, before + rate * excess));
+        parallel_for(size_t{0}, pulling_.size(), [&](size_t chunk) {
+            std::vector<Pulling>& pulling = pulling_[chunk];
+            size_t kept = 0;
+            for (Pulling one : pulling)
+                if (update(one, rate, accumulating)) pulling[kept++] = one;
+            pulling.resize(kept);
+            const size_t end = std::min(points_.size(), (chunk + 1) * kPointChunk);
+            for (size_t p = chunk * kPointChunk + iteration % kPointStride; p < end; p += kPointStride) {
+                if (multiplier_[p] > 0) continue; // it is there
+                Pulling one{static_cast<uint32_t>(p), {}, {}};
+                if (update(one, rate, accumulating)) pulling.push_back(one);
             }
         });
-        pull_.assign(moving_, {Vec::Zero(), Mat::Zero()});
-        for (size_t p = 0; p < points_.size(); ++p) {
-            if (multiplier_[p] == 0) continue;
-            const Fit& fit = fits_[owner_[p]];
-            const Vec y = fit.inverse * (points_[p] - fit.center), outward = y.normalized();
-            pull_[owner_[p]].s += double{multiplier_[p]} * outward;
-            const Mat g = double{multiplier_[p]} * outward * y.transpose();
-            pull_[owner_[p]].g += 0.5 * (g + g.transpose());
-        }
+        pull_.assign(moving_, {});
+        for (const std::vector<Pulling>& pulling : pulling_)
+            for (const Pulling& one : pulling) {
+                const Vec s = one.s.cast<double>(), y = one.y.cast<double>();
+                Coordinates& sum = pull_[owner_[one.point]];
+                for (int k = 0; k < 3; ++k) sum[size_t(k)] += s[k], sum[size_t(k) + 3] += s[k] * y[k];
+                sum[6] += s[0] * y[1], sum[7] += s[0] * y[2], sum[8] += s[1] * y[2]; // s and y are parallel
+            }
     }
 
-    // Radial coordinate of the point in its owner. Among the owner and its neighbours, the most central one becomes
-    // the owner.
-    double find_owner(size_t p) {
-        const Vec& x = points_[p];
-        const uint32_t old = owner_[p];
-        double nearest = fits_[old].radial_squared(x);
+    // Does the point pull? Among its owner and the owner's neighbours, the one that has it most centrally is its owner.
+    bool update(Pulling& one, double rate, bool accumulating) {
+        const Vec& x = points_[one.point];
+        uint32_t& owner = owner_[one.point];
+        double nearest = fits_[owner].radial_squared(x);
         if (nearest > 1)
-            for (const uint32_t other : neighbours_[old])
+            for (const uint32_t other : neighbours_[owner]) // of the one that owned it, whoever does next
                 if (const double radial = fits_[other].radial_squared(x); radial < nearest && other < moving_)
-                    nearest = radial, owner_[p] = other;
-        return std::sqrt(nearest);
+                    nearest = radial, owner = other;
+        float& multiplier = multiplier_[one.point];
+        const double far = std::sqrt(nearest), before = accumulating ? double{multiplier} : 0;
+        multiplier = static_cast<float>(std::max(0.0, before + rate * std::min(far - 1, kMaxExcess)));
+        if (multiplier == 0) return false;
+        const Vec y = fits_[owner].radial(x);
+        one.y = y.cast<float>(), one.s = (double{multiplier} / std::max(far, 1e-30) * y).cast<float>();
+        return true;
     }
 
     // Points whose owner has moved away for good look for the most central one of all.
@@ -280,21 +268,16 @@ private:
         return out;
     }
 
-    struct Pull {
-        Vec s;
-        Mat g;
-    };
-
     std::vector<Fit>& fits_;
     const DistanceField& field_;
     std::span<const Vec> points_;
     std::vector<uint32_t> owner_;
     const DescentOptions& options_;
     Random random_;
-    const std::vector<Vec> directions_;
-    std::vector<Vec> rotated_;
-    std::vector<float> multiplier_; // of each point
-    std::vector<Pull> pull_;        // of all points on each ellipsoid
+    BorderSamples border_;
+    std::vector<float> multiplier_;             // of each point
+    std::vector<std::vector<Pulling>> pulling_; // by chunks of points
+    std::vector<Coordinates> pull_;             // of all points on each ellipsoid
     std::vector<Momentum> momentum_;
     const size_t moving_;                                // the first so many do
     double decay_mean_ = kMean, decay_square_ = kSquare; // powers of the above: what is missing from young averages
@@ -307,22 +290,6 @@ private:
 void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
              std::vector<uint32_t> owner, const DescentOptions& options) {
     GradientDescent(fits, field, points, std::move(owner), options).run();
-}
-
-std::vector<Vec> even_directions(int count) {
-    // Cosine and sine of the golden angle pi (3 - sqrt 5), and no others: libraries differ in their last digits.
-    constexpr double kCos = -0.73736887807831985597, kSin = 0.67549029426152362732;
-    std::vector<Vec> out;
-    double c = 1, s = 0;
-    for (int i = 0; i < count; ++i) {
-        const double z = 1 - (2 * i + 1.0) / count, r = std::sqrt(1 - z * z);
-        out.emplace_back(r * c, r * s, z);
-        const double turned = c * kCos - s * kSin;
-        s = s * kCos + c * kSin, c = turned;
-        const double length = std::sqrt(c * c + s * s);
-        c /= length, s /= length;
-    }
-    return out;
 }
 
 Mat random_rotation(Random& random) {

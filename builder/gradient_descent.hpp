@@ -62,10 +62,6 @@ struct DescentOptions {
 void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
              std::vector<uint32_t> owner, const DescentOptions& options);
 
-/// Directions evenly spread over the sphere (a Fibonacci lattice, Gonzalez 2010), by arithmetic that is the same on
-/// every machine.
-std::vector<Vec> even_directions(int count);
-
 /// A rotation, drawn uniformly.
 class Random;
 Mat random_rotation(Random& random);

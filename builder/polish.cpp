@@ -1,5 +1,6 @@
 #include "builder/polish.hpp"
 
+#include "builder/border.hpp"
 #include "builder/cover.hpp"
 #include "builder/job.hpp"
 #include "builder/random.hpp"

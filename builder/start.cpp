@@ -1,5 +1,6 @@
 #include "builder/start.hpp"
 
+#include "builder/border.hpp"
 #include "builder/divide.hpp"
 #include "builder/gradient_descent.hpp"
 #include "builder/job.hpp"

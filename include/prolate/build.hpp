@@ -82,7 +82,7 @@ BallRange ball_range(double longest_side) noexcept;
 
 /// Version of the algorithm, from load_mesh() to the quantised nodes. It rises whenever the same file and options give
 /// other bytes, so that no cache takes an old bake for a new one.
-inline constexpr uint32_t kBuilderVersion = 17;
+inline constexpr uint32_t kBuilderVersion = 18;
 
 /// Hash of everything except the mesh that determines the bytes: the options (without `threads`), kBuilderVersion and
 /// kFormatVersion. With hash(MeshView) of the cleaned mesh it makes the key of a cache of bakes. BakeInfo holds both.

@@ -1,4 +1,5 @@
 // The joint descent: onto solids whose best covers are known.
+#include "builder/border.hpp"
 #include "builder/columns.hpp"
 #include "builder/gradient_descent.hpp"
 #include "builder/random.hpp"
