@@ -84,8 +84,7 @@ bool OneWay::begin(std::span<const MeetingPair> some) noexcept {
     }
     if (from == nullptr) return false;
     const Way way = bodies_.shortest_way(best.normal, *from, HUGE_VAL);
-    const double share = way.depth > 0 ? kOwnShorter : 1; // below 0 bodies are apart
-    if (own_ < share * way.depth - bodies_.same_point)
+    if (own_is_shorter(kOwnShorter, way.depth))
         start({mean, HUGE_VAL}, false), ++turns_;
     else
         start(way, true);
@@ -141,6 +140,11 @@ double OneWay::most() const noexcept {
     return way_.depth + kSlackOfWay * std::abs(way_.depth) + bodies_.same_point;
 }
 
+// Of bodies that are apart, within the margin, no pair needs a way out at all.
+bool OneWay::own_is_shorter(double share, double depth) const noexcept {
+    return depth > 0 && own_ < share * depth - bodies_.same_point;
+}
+
 // Other parts of the bodies may be deeper than what was climbed.
 bool OneWay::confirm_climbs() noexcept {
     if (points_.depth() > most() || beside_ > most()) return false;
@@ -153,9 +157,8 @@ bool OneWay::confirm_climbs() noexcept {
 }
 
 bool OneWay::confirm_inside() noexcept {
-    const auto own_is_shorter = [&] { return own_ < kOwnMuchShorter * points_.depth() - bodies_.same_point; };
     const Patch from = points_; // which it adds to
-    if (own_is_shorter()) return false;
+    if (own_is_shorter(kOwnMuchShorter, points_.depth())) return false;
     const TouchingBodies::Inside inside = bodies_.deepest_inside(from, way_, [this](const Contact& c) { take(c); });
     points_.deepen(std::min(inside.overlap, kBeside * points_.depth()));
     way_.depth = points_.depth();
@@ -171,7 +174,8 @@ bool OneWay::confirm_inside() noexcept {
     }
     if (glm::dot(bears_, way_.normal) < 0) bears_ = -bears_;
     // Else another direction, or several.
-    return glm::dot(bears_, way_.normal) >= kFacing && beside_ <= most() && !own_is_shorter();
+    return glm::dot(bears_, way_.normal) >= kFacing && beside_ <= most() &&
+           !own_is_shorter(kOwnMuchShorter, points_.depth());
 }
 
 } // namespace prolate::query

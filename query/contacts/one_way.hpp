@@ -50,6 +50,7 @@ private:
     bool clip(const MeetingPair& pair, const PlacedTriangle& a, const PlacedTriangle& b) noexcept;
     void take(const Contact& contact) noexcept;
     double most() const noexcept;
+    bool own_is_shorter(double share, double depth) const noexcept;
     bool confirm_climbs() noexcept;
     bool confirm_inside() noexcept;
 
