@@ -4,8 +4,8 @@
 # A good guess: every broad phase reports every pair of objects whose boxes meet, in whatever order they were registered.
 # That is what the five other managers do.
 # What it does: registerObject() looks for new pairs only at those ends of boxes that lie, along x, between the new box's
-# own two ends, and it leaves out the last end of all (src/broadphase/broadphase_SaP.cpp). So a box is not seen that
-# reaches past the new one on both sides, as a floor, a table or a whole map do, nor one whose end is the last along x.
+# own two ends, and it leaves out the last end of all, as its source says. So a box is not seen that reaches past the new
+# one on both sides, as a floor, a table or a whole map do, nor one whose end is the last along x.
 # setup() and update() do not mend it: the pair comes up once one of the two has left the other's box and come back.
 # What to do: take another manager.
 #

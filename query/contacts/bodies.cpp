@@ -1,5 +1,6 @@
 #include "query/contacts/bodies.hpp"
 
+#include <prolate/distance.hpp>
 #include <prolate/raycast.hpp>
 
 #include <glm/geometric.hpp>
@@ -64,12 +65,13 @@ Candidate Candidates::of(const Contact& c) const noexcept {
             .pair = c.pair};
 }
 
-TouchingBodies::TouchingBodies(const TreeView& a, const TreeView& b, const RelativePose& pose_b_to_a, float as_near,
+TouchingBodies::TouchingBodies(const OrderedBodies<Pose>& bodies, const RelativePose& pose_b_to_a, float as_near,
                                const Budget& budget, const DividedScratch& scratch, double one_point) noexcept
-    : tree_a(a), tree_b(b), b_to_a(pose_b_to_a), margin(as_near), same_point(one_point), closed_a(is_closed(a)),
-      closed_b(is_closed(b)), budget_(budget), context_(scratch.least),
-      hills_a_(a, budget.others, budget.most, scratch.rest.first(scratch.rest.size() / 2)),
-      hills_b_(b, budget.others, budget.most, scratch.rest.subspan(scratch.rest.size() / 2)) {}
+    : tree_a(bodies.a), tree_b(bodies.b), b_to_a(pose_b_to_a), margin(as_near), same_point(one_point),
+      closed_a(is_closed(tree_a)), closed_b(is_closed(tree_b)), place_a_(bodies.place_a), place_b_(bodies.place_b),
+      budget_(budget), context_(scratch.least),
+      hills_a_(tree_a, budget.others, budget.most, scratch.rest.first(scratch.rest.size() / 2)),
+      hills_b_(tree_b, budget.others, budget.most, scratch.rest.subspan(scratch.rest.size() / 2)) {}
 
 Surrounded TouchingBodies::surrounded_a(uint32_t triangle) const noexcept {
     return {.triangle = place(tree_a, triangle),
@@ -201,6 +203,17 @@ void TouchingBodies::deepest(const Patch& patch, const Way& way, const ContactSi
             if (!(glm::dot(c.normal, way.normal) > kSameAsFace)) look(c.pair, c.normal); // in a hollow of faces
         });
     }
+}
+
+std::optional<Way> TouchingBodies::between_nearest() noexcept {
+    const auto a = tree_a.rounded(0), b = tree_b.rounded(0); // their cores
+    if (!a || !b) return {};
+    const DistanceResult found =
+        distance(*a, place_a_, *b, place_b_, context_, {.max_distance = margin, .max_pair_tests = budget_.left()});
+    budget_.others += found.stats.tests();
+    const dvec3 normal(found.normal.x, found.normal.y, found.normal.z); // in the world
+    if (found.verdict != Verdict::separated || !(found.upper <= margin) || normal == dvec3(0)) return {};
+    return Way{glm::normalize(normal * relative_pose(Pose{}, place_a_).rotation), -found.upper};
 }
 
 // From the corners of a pair's triangles on, always to the neighbour that lies deepest, where climbs would go on

@@ -6,6 +6,7 @@
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
 #include "query/node/limits.hpp"
+#include "query/node/order.hpp"
 #include "query/node/scratch.hpp"
 #include "query/triangle/contact.hpp"
 
@@ -14,6 +15,7 @@
 #include <glm/vec3.hpp>
 
 #include <cstdint>
+#include <optional>
 
 namespace prolate::query {
 
@@ -89,7 +91,7 @@ class TouchingBodies {
 public:
     /// Points nearer to each other than `same_point`, metres, are one. All that is referred to must outlive it. Between
     /// two traversals the rays use the least scratch; the climbs always the rest.
-    TouchingBodies(const TreeView& a, const TreeView& b, const RelativePose& b_to_a, float margin, const Budget& budget,
+    TouchingBodies(const OrderedBodies<Pose>& bodies, const RelativePose& b_to_a, float margin, const Budget& budget,
                    const DividedScratch& scratch, double same_point) noexcept;
 
     const TreeView &tree_a, &tree_b;
@@ -112,6 +114,8 @@ public:
     Way shortest_way(const glm::dvec3& from, const MeetingPair& pair, double most) const noexcept;
     /// The same of a patch: its mean, where all have one normal.
     glm::dvec3 shortest_way(const Patch& patch) const noexcept;
+    /// From where one is nearest to the other, if they are apart: as deep as that is below 0. Not during a traversal.
+    std::optional<Way> between_nearest() noexcept;
     /// What of either body is deepest in the other along the way, and no deeper than it, around the pairs of a patch:
     /// of a finely meshed body it meets no triangle. Of each body at most two vertices for each of the patch's points:
     /// the tops of the hills around them. Not during a traversal.
@@ -132,6 +136,7 @@ private:
     };
     Exit add_depth_of(uint32_t vertex, bool of_a, const MeetingPair& pair, const Way& way, const ContactSink& out);
 
+    const Pose &place_a_, &place_b_;
     const Budget budget_;
     Scratch context_;
     const Hills hills_a_, hills_b_;

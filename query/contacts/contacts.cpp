@@ -14,9 +14,8 @@
 // resolves them, and reach no farther out than the patch's points (node_pair.hpp); the others are opened in the order
 // of how much farther they do. In the mean of the normals, what is left out weighs about as much.
 //
-// Complexity: that of collide_all() without what is left out, and of one way a tenth of a microsecond or two for each
-// pair that meets, some 30 climbs and two rays; otherwise twice collide_all()'s, some microseconds for each pair, and
-// for each patch up to 18 climbs and rays.
+// Complexity: that of collide_all() without what is left out, and of one way .1 or .2 us for each pair that meets, some
+// 30 climbs and two rays; otherwise twice that, some us for each pair, and for each patch up to 18 climbs and rays.
 #include "query/contacts/contacts.hpp"
 #include "query/contacts/last_contacts.hpp"
 #include "query/contacts/manifold.hpp"
@@ -33,7 +32,6 @@
 #include <cmath>
 #include <optional>
 #include <span>
-#include <utility>
 
 namespace prolate {
 namespace query {
@@ -55,13 +53,13 @@ double smaller_size(const CollideSearch& search) {
 
 class Collector {
 public:
-    Collector(CollideSearch& search, const DividedScratch& scratch, bool exchanged, const LastContacts& last,
-              uint64_t many)
+    Collector(CollideSearch& search, const DividedScratch& scratch, const OrderedBodies<Pose>& bodies,
+              const LastContacts& last, uint64_t many)
         : search_(search), many_(many), size_(smaller_size(search)),
-          bodies_(search.a.tree, search.b.tree, search.b_to_a, search.options.margin,
+          bodies_(bodies, search.b_to_a, search.options.margin,
                   {search.stats, search.other_tests, search.options.max_pair_tests}, scratch, kSamePoint * size_),
-          pairs_(search, bodies_), candidates_{last, exchanged}, one_way_(bodies_, candidates_, ways_[0], points_[0]),
-          patches_(kSamePoint * size_),
+          pairs_(search, bodies_), candidates_{last, bodies.exchanged},
+          one_way_(bodies_, candidates_, ways_[0], points_[0]), patches_(kSamePoint * size_),
           of_ellipsoids_(!search.a.tree.has_triangles() && !search.b.tree.has_triangles()) {
         const bool limited = search.a.limit_from != UINT32_MAX || search.b.limit_from != UINT32_MAX;
         if (!bodies_.closed_a || !bodies_.closed_b || limited) phase_ = Phase::normals;
@@ -142,9 +140,10 @@ private:
         ++looked_at_, resolved_ += resolving != 0;
         if (resolving == 0) return HUGE_VAL;
         e.flags |= resolving * kFirstSiftBit;
-        const auto extent = [&](const dvec3& d) { return pair.extent(d); };
-        const auto gain = [&](const Patch& patch, const dvec3& n, double share) {
-            return patch.empty() ? HUGE_VAL : patch.gain(pair.overlap(n), same_point(), share, extent);
+        const bool along = phase_ == Phase::one_way; // which has points where both triangles are, seen along the way
+        const auto extent = [&](const dvec3& d) { return pair.extent(d, along ? 0 : 0.5 * search_.options.margin); };
+        const auto gain = [&](const Patch& p, const dvec3& n, double share) {
+            return p.empty() ? HUGE_VAL : p.gain(pair.overlap(n), same_point(), share, extent);
         };
         if (phase_ == Phase::normals) {
             Patch& patch = patches_[resolving - 1];
@@ -153,6 +152,7 @@ private:
             if (!(out > 0)) patch.weigh(n, static_cast<double>(pair.triangles()) * weight_of(patch.depth()));
             return out;
         }
+        if (along && pair.overlap(ways_[0].normal) < -search_.options.margin) return 0;
         double most = 0; // a pair's points are those of the first way that resolves it
         for (uint32_t i = 0; i < resolving; ++i) most = std::max(most, gain(points_[i], ways_[i].normal, kFartherOut));
         const auto holds = [&](const dvec3& p) { return points_[resolving - 1].holds(p, same_point(), extent); };
@@ -200,8 +200,8 @@ private:
     // False if the bodies have none, or several.
     bool in_one_way(std::span<const MeetingPair> first) {
         if (one_way_.confirm()) return true;
-        reduce_ = false;
         while (one_way_.turn()) {
+            reduce_ = reduce_ && one_way_.by_climbs();
             again(Phase::one_way, first);
             if (one_way_.confirm()) return true;
         }
@@ -364,7 +364,7 @@ ContactResult contacts(const TreeView& a, const Pose& pose_a, const TreeView& b,
     const RelativePose to_world = relative_pose(Pose{}, bodies.place_a);
     const LastContacts last(manifolds, bodies.exchanged, to_world);
     manifolds = {};
-    Collector collector(search, scratch, bodies.exchanged, last, many);
+    Collector collector(search, scratch, bodies, last, many);
     MeetingPair met[kMany];
     search.all = true, search.pairs = met;
     ContactResult out;

@@ -106,9 +106,9 @@ bool NodePair::resolved_by(const Way& way, double same_point, std::optional<dvec
     return std::abs(glm::dot(way.normal, *normal)) > kSameAsFace;
 }
 
-Extent NodePair::extent(const dvec3& d) const noexcept {
+Extent NodePair::extent(const dvec3& d, double beside) const noexcept {
     const Extent of_a = extent_of(a_, d), of_b = extent_of(b_, d * s_.b_to_a.rotation); // the transpose times it
-    const double shift = glm::dot(d, s_.b_to_a.translation), beside = 0.5 * s_.options.margin;
+    const double shift = glm::dot(d, s_.b_to_a.translation);
     return {std::max(of_a.low, of_b.low + shift) - beside, std::min(of_a.high, of_b.high + shift) + beside};
 }
 

@@ -26,8 +26,8 @@ public:
     glm::dvec3 normal() const noexcept;
     /// How far what is below A's node reaches beyond the first of what is below B's along n, of length 1; not less.
     double overlap(const glm::dvec3& n) const noexcept;
-    /// Where along d, in A's frame, points of contact may lie.
-    Extent extent(const glm::dvec3& d) const noexcept;
+    /// Where along d, in A's frame, points of contact may lie, up to `beside` beside both.
+    Extent extent(const glm::dvec3& d, double beside) const noexcept;
     /// Do they only touch along the way, or does it resolve all pairs below them, if they are flat, with their normal?
     /// Keeps normal() once it has asked for it.
     bool resolved_by(const Way& way, double same_point, std::optional<glm::dvec3>& normal) const noexcept;

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace prolate::query {
 namespace {
@@ -92,6 +94,12 @@ bool OneWay::begin(std::span<const MeetingPair> some) noexcept {
 }
 
 bool OneWay::turn() noexcept {
+    if (apart_) return false;
+    const std::optional<Way> between = bodies_.margin > 0 ? bodies_.between_nearest() : std::nullopt;
+    if (between) {
+        apart_ = true, start(*between, true);
+        return true;
+    }
     const dvec3 n = by_climbs_ ? faces_.direction() : bears_;
     if (n == dvec3(0) || turns_ == kTurns) return false;
     start({n, HUGE_VAL}, false);
@@ -128,7 +136,10 @@ void OneWay::add(const MeetingPair& pair) noexcept {
     if (by_climbs_ && resolved && !points_.empty() &&
         !(points_.gain(overlap, bodies_.same_point, kOutline, extent) > -2 * bodies_.same_point))
         return;
-    if (!clip(pair, a, b) || by_climbs_) beside_ = std::max(beside_, overlap);
+    if (clip(pair, a, b) && !by_climbs_) return;
+    // Parts that are apart and lie beside each other are nearer along the way: a plane between all around them will do.
+    const bool between = by_climbs_ && way_.depth < 0 && !resolved && overlap <= 0 && !(beside_ > most());
+    beside_ = std::max(beside_, between && bodies_.overlap(way_.normal, pair, 0) <= 0 ? way_.depth : overlap);
 }
 
 bool OneWay::confirm() noexcept {

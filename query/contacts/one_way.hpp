@@ -5,8 +5,9 @@
 // The way is sought twice. First as where the bodies, climbed around the pairs, overlap least, as convex bodies do. It
 // is confirmed if something lies about as deep there: if not, the climbs have left the place where the bodies touch, as
 // they do inside a ring, along a thread or in a hollow. Then along the mean of the faces, and along that face through
-// which the deepest point would leave, as deep as what can be reached without leaving the other body. What none of
-// these finds, as where a box stands in a corner, has several ways.
+// which the deepest point would leave, as deep as what can be reached without leaving the other body. Bodies that are
+// apart, within a margin, have the way between their nearest points, if a plane across it lies between all that is near
+// each pair. What none of these finds, as where a box stands in a corner, has several ways.
 #pragma once
 
 #include "query/contacts/bodies.hpp"
@@ -38,8 +39,11 @@ public:
     /// closed.
     bool begin(std::span<const MeetingPair> some) noexcept;
     /// After confirm() said no: begins again with the next direction, for which all pairs must be added once more.
-    /// False if there is none left. First that of the mean of the faces; then that along which what was deepest bears.
+    /// False if there is none left. Of bodies that are apart, within the margin, the one between their nearest points.
+    /// Else first that of the mean of the faces; then that along which what was deepest bears.
     bool turn() noexcept;
+    /// Is the depth of this direction known, or that of the pairs?
+    bool by_climbs() const noexcept { return by_climbs_; }
     /// Takes the points of a pair.
     void add(const MeetingPair& pair) noexcept;
     /// After all pairs, and not during a traversal: is this the way out? Finds the deepest points.
@@ -58,7 +62,7 @@ private:
     const Candidates& candidates_;
     Way& way_;
     Patch& points_;
-    bool by_climbs_ = true;
+    bool by_climbs_ = true, apart_ = false;
     FacesMean faces_;
     glm::dvec3 bears_{0, 0, 0};
     uint32_t turns_ = 0;

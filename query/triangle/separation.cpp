@@ -13,7 +13,20 @@ namespace prolate::query {
 using glm::dmat3;
 using glm::dvec3;
 
+namespace {
+
+// No direction says otherwise, but 26 of them would have to be asked: triangles are often smaller than a margin.
+bool corners_within(const PlacedTriangle& a, const PlacedTriangle& b, double distance) {
+    const auto within = [&](const dvec3& p, const dvec3& q) { return glm::dot(p - q, p - q) <= distance * distance; };
+    return std::any_of(a.corner, a.corner + 3, [&](const dvec3& p) {
+        return std::any_of(b.corner, b.corner + 3, [&](const dvec3& q) { return within(p, q); });
+    });
+}
+
+} // namespace
+
 bool separated(const PlacedTriangle& a, const PlacedTriangle& b, double distance, double margin) noexcept {
+    if (distance > 0 && corners_within(a, b, distance)) return false;
     const TrianglePair pair(a, b);
     const double bound = margin * (a.reach + b.reach) + distance;
     return pair.any_direction([&](const dvec3& n) { // false for a NaN, and for zero

@@ -174,7 +174,7 @@ TEST(Bits, Distance) {
 }
 
 TEST(Bits, Contacts) {
-    expect_bits(2189966202774056317u, [](Bits& bits, const Scenes::Pair& p) {
+    expect_bits(10802575758187684427u, [](Bits& bits, const Scenes::Pair& p) {
         ContactManifolds manifolds;
         const ContactResult r = contacts(p.a, p.pose_a, p.b, p.pose_b, manifolds, context(), {.margin = 0.01f});
         bits.add_all(r.verdict, r.enclosed, r.found, r.stats, manifolds.count);
