@@ -4,7 +4,7 @@
 #
 # A good guess: fromto="x y z x y z" gives the two ends of a long geom, and size its half width; MuJoCo has it for
 # capsules, cylinders, ellipsoids and boxes, and a reader that lacks it for some says so, as Drake 1.51.1 does.
-# What they do: Newton looks at fromto for capsules and cylinders only (newton/_src/utils/import_mjcf.py). For the others
+# What they do: Newton looks at fromto for capsules and cylinders only (so its source, import_mjcf). For the others
 # it takes the one number of size for all three half axes, and leaves the place alone. A link of a meter becomes a ball
 # at the joint. Rapier places the geom right, but takes zero for the half axes that size does not have. Neither says
 # anything. What to do: write pos, quat and three numbers, as MuJoCo 4.0.0 and Pinocchio 4.1.0 have read it.
