@@ -181,3 +181,38 @@ def test_numbers_that_are_not_finite_are_refused(write, old, new):
     with pytest.raises(prolate.Error, match=r"robot\.xml: MuJoCo") as error:
         robots.load(write(ROBOT.replace(old, new)))
     assert error.value.code == "bad_file"
+
+
+def test_what_other_readers_lose(tmp_path):
+    """Copies, ends, and what a class says of a mesh's scale and a geom's place: findings/*mjcf*.sh."""
+    (tmp_path / "part.obj").write_text(TETRAHEDRON)
+    path = tmp_path / "robot.xml"
+    path.write_text("""<mujoco>
+<default>
+  <default class="small"><mesh scale="0.001 0.002 0.003"/></default>
+  <default class="place"><geom type="box" size="0.1 0.2 0.3" pos="1 0 0" euler="0 90 0"/></default>
+</default>
+<asset><mesh name="part" class="small" file="part.obj"/></asset>
+<worldbody>
+  <replicate count="2" offset="0 0 5">
+    <body name="rack"><joint name="j"/><replicate count="3" offset="0 2 0"><geom class="place"/></replicate></body>
+  </replicate>
+  <body name="rod"><joint/><geom type="ellipsoid" fromto="0 0 0 4 0 0" size="0.1"/>
+    <geom type="box" fromto="0 0 0 4 0 0" size="0.1"/><geom type="mesh" mesh="part"/></body>
+</worldbody>
+</mujoco>""")
+    robot = robots.load(path)
+    for rack in ("rack0", "rack1"):
+        boxes = link(robot, rack).collisions
+        assert [box.shape for box in boxes] == 3 * [robots.BoxShape((0.2, 0.4, 0.6))]
+        np.testing.assert_allclose([box.pose[:3, 3] for box in boxes], [[1, 0, 0], [1, 2, 0], [1, 4, 0]])
+        np.testing.assert_allclose([np.abs(box.pose[:3, 0]) for box in boxes], 3 * [[0, 0, 1]], atol=1e-12)
+    ellipsoid, box, mesh = link(robot, "rod").collisions
+    assert ellipsoid.shape == robots.EllipsoidShape((0.1, 0.1, 2)) and box.shape == robots.BoxShape((0.2, 0.2, 4))
+    for geometry in (ellipsoid, box):
+        np.testing.assert_allclose(geometry.pose[:3, 3], [2, 0, 0])
+        np.testing.assert_allclose(np.abs(geometry.pose[:3, 2]), [1, 0, 0], atol=1e-12)
+    corners = [[float(x) for x in line.split()[1:]] for line in TETRAHEDRON.splitlines() if line.startswith("v ")]
+    placed = mesh.shape.vertices @ mesh.pose[:3, :3].T + mesh.pose[:3, 3]
+    gaps = np.linalg.norm(placed[:, None] - np.array(corners) * [0.001, 0.002, 0.003], axis=2)
+    assert gaps.min(axis=0).max() < 1e-9 and gaps.min(axis=1).max() < 1e-9
