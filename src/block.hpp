@@ -8,6 +8,8 @@
 
 #include <prolate/tree.hpp>
 
+#include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -59,6 +61,39 @@ inline int32_t stored_center(const std::byte* block, size_t i, size_t lane) {
     const uint32_t fractions = load_le<uint16_t>(block + kBlockFraction + 2 * lane);
     return load_le<uint16_t>(block + block_offset(kBlockCenter, i, lane)) * kCenterUnits +
            static_cast<int32_t>(fractions >> kFractionBits * i & (kCenterUnits - 1));
+}
+
+/// What the squares of a node's factor are multiples of, in steps: a normal float, since open() bounds the exponents.
+inline constexpr int32_t kFactorBias = 127 - 30;
+inline float factor_unit(int32_t exponent, int32_t step_exponent) {
+    return std::bit_cast<float>((exponent + (kFactorBias - step_exponent)) << 23);
+}
+
+/// A node as stored, lattice steps of its own tree.
+struct LaneNode {
+    float center[3];
+    float l11, l21, l22, l31, l32, l33;
+};
+inline LaneNode load_node(const std::byte* block, uint32_t lane, int32_t step_exponent) {
+    const auto at = [&](size_t array, size_t i) { return block + block_offset(array, i, lane); };
+    const auto natural = [&](size_t array, size_t i) { return static_cast<float>(load_le<uint16_t>(at(array, i))); };
+    const float unit = factor_unit(load_le<int8_t>(block + kBlockExponent + lane), step_exponent);
+    const auto diagonal = [&](size_t i) {
+        const float q = natural(kBlockDiagonal, i);
+        return q * unit * q;
+    };
+    const auto off_diagonal = [&](size_t i) {
+        const auto q = static_cast<float>(load_le<int16_t>(at(kBlockOffDiagonal, i)));
+        return q * unit * std::abs(q);
+    };
+    const auto center = [&](size_t i) { return static_cast<float>(stored_center(block, i, lane)) / kCenterUnits; };
+    return {{center(0), center(1), center(2)},
+            diagonal(0),
+            off_diagonal(0),
+            diagonal(1),
+            off_diagonal(1),
+            off_diagonal(2),
+            diagonal(2)};
 }
 
 /// Slot of the first child of the inner node in `lane`.

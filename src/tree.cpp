@@ -281,17 +281,20 @@ bool TreeView::is_node(uint32_t slot) const noexcept {
 
 namespace {
 
+// As format::decode() does, in fewer steps.
 Ellipsoid ellipsoid_at(const std::byte* from, size_t lane, const LatticeInfo& lattice) {
-    format::PackedNode packed;
-    const uint32_t fractions = load_le<uint16_t>(from + kBlockFraction + 2 * lane);
-    for (size_t i = 0; i < 3; ++i) {
-        packed.center[i] = load_le<uint16_t>(from + block_offset(kBlockCenter, i, lane));
-        packed.fraction[i] = static_cast<uint8_t>(fractions >> kFractionBits * i & (kCenterUnits - 1));
-        packed.diagonal[i] = load_le<uint16_t>(from + block_offset(kBlockDiagonal, i, lane));
-        packed.off_diagonal[i] = load_le<int16_t>(from + block_offset(kBlockOffDiagonal, i, lane));
-    }
-    packed.exponent = load_le<int8_t>(from + kBlockExponent + lane);
-    return format::decode(packed, lattice);
+    const LaneNode e = load_node(from, static_cast<uint32_t>(lane), 0); // in metres, but for the center
+    const auto unit = static_cast<float>(power_of_two(lattice.step_exponent) / kCenterUnits);
+    const auto coordinate = [&](size_t i) { // of no more bits than a float has
+        return static_cast<float>(lattice.origin[i] * kCenterUnits + stored_center(from, i, lane)) * unit;
+    };
+    return {.center = {coordinate(0), coordinate(1), coordinate(2)},
+            .l11 = e.l11,
+            .l21 = e.l21,
+            .l22 = e.l22,
+            .l31 = e.l31,
+            .l32 = e.l32,
+            .l33 = e.l33};
 }
 
 } // namespace

@@ -244,6 +244,19 @@ template <bool kMargin> HWY_INLINE Mask separated(const LaneTerms& t, Float marg
     return (t.gap > threshold) & (t.one_norm > kLaneDirection);
 }
 
+/// Lanes that certainly overlap the single; t: what evaluate() found. With Q = W1 Q1 + W2 Q2 as there, its trace 1, the
+/// point c1 + W1 Q1 n / det(Q) = c2 - W2 Q2 n / det(Q) lies in both if W1 a and W2 b are at most det(Q)
+/// (query/ellipsoid/separation.hpp). In the terms above Q is wrong by 40 u, its adjugate by 90 u, det(Q) by 136 u, and
+/// n by 95 u |r| + |dc1|. With W1 |L1| = W2 |L2| = 1 / (|L1| + |L2|), W1 a and W2 b are wrong by at most
+/// (116 u |r| + |dc1|) / (|L1| + |L2|); kOverlapLaneMargin is 256 u.
+HWY_INLINE Mask overlapping(const LaneNodes& e, const Single& s, const LaneTerms& t) {
+    const Float w2 = 1 / (t.size * (t.size + s.size)), w1 = t.size * w2;
+    const Sym3 q = mixed(s, shape_of(e.factor), w1, w2);
+    const Float room = determinant(q, adjugate(q)) - kOverlapLaneMargin;
+    const Float most = room - w1 * (kOverlapLaneMargin * one_norm(between(e, s)) + s.slack);
+    return (t.a * (w1 * s.weight) <= most) & (t.b * w2 <= most);
+}
+
 } // namespace prolate::query::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif // PROLATE_QUERY_LANES_INL_HPP

@@ -16,8 +16,9 @@
 
 namespace prolate::query {
 
-inline constexpr float kLaneMargin = 0x1p-19f;    ///< 32 u, u = 2^-24: see lanes-inl.hpp
-inline constexpr float kLaneDirection = 0x1p-60f; ///< least |n|_1 of a direction that may separate
+inline constexpr float kLaneMargin = 0x1p-19f;        ///< 32 u, u = 2^-24: see lanes-inl.hpp
+inline constexpr float kOverlapLaneMargin = 0x1p-16f; ///< 256 u: see overlapping() there
+inline constexpr float kLaneDirection = 0x1p-60f;     ///< least |n|_1 of a direction that may separate
 /// Bounds the length of a stored center, lattice steps.
 inline constexpr float kLargestCenter = 113512;
 /// 8 u: half a box's width grows by this share of the length of the box's center, and by kBoxSlack = 2^16 kBoxMargin.
@@ -51,39 +52,6 @@ struct PlacedBox {
     alignas(16) float axis[3][4]; ///< half the sides
     float slack;
 };
-
-/// What the squares of a node's factor are multiples of, in steps: a normal float, since open() bounds the exponents.
-inline constexpr int32_t kFactorBias = 127 - 30;
-inline float factor_unit(int32_t exponent, int32_t step_exponent) {
-    return std::bit_cast<float>((exponent + (kFactorBias - step_exponent)) << 23);
-}
-
-/// A node as stored, lattice steps of its own tree.
-struct LaneNode {
-    float center[3];
-    float l11, l21, l22, l31, l32, l33;
-};
-inline LaneNode load_node(const std::byte* block, uint32_t lane, int32_t step_exponent) {
-    const auto at = [&](size_t array, size_t i) { return block + block_offset(array, i, lane); };
-    const auto natural = [&](size_t array, size_t i) { return static_cast<float>(load_le<uint16_t>(at(array, i))); };
-    const float unit = factor_unit(load_le<int8_t>(block + kBlockExponent + lane), step_exponent);
-    const auto diagonal = [&](size_t i) {
-        const float q = natural(kBlockDiagonal, i);
-        return q * unit * q;
-    };
-    const auto off_diagonal = [&](size_t i) {
-        const auto q = static_cast<float>(load_le<int16_t>(at(kBlockOffDiagonal, i)));
-        return q * unit * std::abs(q);
-    };
-    const auto center = [&](size_t i) { return static_cast<float>(stored_center(block, i, lane)) / kCenterUnits; };
-    return {{center(0), center(1), center(2)},
-            diagonal(0),
-            off_diagonal(0),
-            diagonal(1),
-            off_diagonal(1),
-            off_diagonal(2),
-            diagonal(2)};
-}
 
 /// The share of Single::slack that is the same for all nodes.
 inline float common_slack(double reach) {

@@ -39,6 +39,16 @@ uint32_t lane_gaps(const std::byte* block, int32_t step_exponent, const Single& 
     return separated_lanes;
 }
 
+// Bit i: lane i certainly overlaps.
+uint32_t overlap_bits(const std::byte* block, int32_t step_exponent, const Single& single) {
+    uint32_t out = 0;
+    for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) {
+        const LaneNodes e = load_nodes(block, i, step_exponent);
+        out |= bits(overlapping(e, single, evaluate(e, single))) << i;
+    }
+    return out;
+}
+
 uint32_t box_bits(const std::byte* block, const Single& single, float margin) {
     return boxes_meet(block, single, margin);
 }
@@ -60,6 +70,7 @@ HWY_AFTER_NAMESPACE();
 namespace prolate::query {
 HWY_EXPORT(lane_gaps);
 HWY_EXPORT(box_bits);
+HWY_EXPORT(overlap_bits);
 HWY_EXPORT(place_blocks);
 HWY_EXPORT(reach_here);
 
@@ -117,6 +128,7 @@ struct Fault {
 
 struct Counts {
     uint64_t pairs = 0, apart = 0, separated = 0, boxes_apart = 0, very_near = 0, wrong = 0, boxes_wrong = 0;
+    uint64_t overlapping = 0, overlaps_wrong = 0;
 };
 
 // Pairs of gaps between `least_gap` and 0.3 of their size, of both signs, added to `counts`.
@@ -166,6 +178,9 @@ void hunt_blocks(Random& random, const Family& family, double least_gap, const F
         counts.separated += separated, counts.boxes_apart += boxes_apart;
         counts.wrong += separated && wrong, counts.boxes_wrong += boxes_apart && wrong;
         EXPECT_EQ(separated, out[lane].gap > 0);
+        const uint32_t overlaps = HWY_DYNAMIC_DISPATCH(overlap_bits)(a.bytes.data(), a.lattice.step_exponent, single);
+        if ((overlaps >> lane & 1) == 0) continue;
+        ++counts.overlapping, counts.overlaps_wrong += truth > 0 || !hunt::overlap(pair, normal);
     }
 }
 
@@ -189,6 +204,7 @@ TEST(Lanes, HuntForWrongVerdicts) {
         hunt_blocks(random, kFamilies[i % std::size(kFamilies)], 1e-7, {}, counts);
         ASSERT_EQ(counts.wrong, 0u) << "blocks " << i;
         ASSERT_EQ(counts.boxes_wrong, 0u) << "blocks " << i;
+        ASSERT_EQ(counts.overlaps_wrong, 0u) << "blocks " << i;
     }
     EXPECT_GT(counts.apart, counts.pairs * 2 / 5);
     EXPECT_LT(counts.apart, counts.pairs * 3 / 5);
@@ -203,10 +219,12 @@ TEST(Lanes, HuntForWrongVerdicts) {
 TEST(Lanes, SeparateMostOfWhatIsApart) {
     const Counts c = hunt_some(1, 20000, {5, 1e-2, 0, 1}, 0.1);
     EXPECT_GT(c.separated, c.apart * 6 / 10);
+    EXPECT_GT(c.overlapping, (c.pairs - c.apart) * 6 / 10);
 }
 
 TEST(LanesHarness, CatchesASingleThatIsTooSmall) {
     EXPECT_GT(hunt_some(3, 20000, kFamilies[0], 1e-7, {.factor = 1 - 1e-3f}).wrong, 0u);
+    EXPECT_GT(hunt_some(3, 20000, kFamilies[0], 1e-3, {.factor = 0.9f}).overlaps_wrong, 0u); // the shape is as it was
 }
 
 TEST(LanesHarness, CatchesABoxThatIsTooSmall) {
