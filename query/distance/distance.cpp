@@ -1,7 +1,7 @@
 // distance(): the query around the traversal (search.cpp). Bodies are taken in their canonical order, and a
 // DistanceCache names the leaves to be looked at first.
 #include "query/distance/rounded.hpp"
-#include "query/distance/search.hpp"
+#include "query/distance/state.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // What the traversal's float bounds leave open is decided here, in double precision.
 #include "query/triangle/leaves.hpp"
-#include "query/distance/search.hpp"
+#include "query/distance/state.hpp"
 #include "query/ellipsoid/gap.hpp"
 #include "query/triangle/ellipsoid_distance.hpp"
 #include "query/triangle/support.hpp"
@@ -18,6 +18,9 @@ namespace {
 // Bounds of two leaves are so much nearer to each other than those of the bodies may be, that leaves as near as the
 // nearest ones make no difference.
 constexpr double kOfTolerance = 0.25;
+
+// After so many much is equally near, along faces above all: these are worth a look before distance().
+constexpr uint64_t kManyBlocks = 128;
 
 DistanceOptions sound(DistanceOptions options) {
     options.tolerance_absolute = sound_tolerance(options.tolerance_absolute);
@@ -103,6 +106,24 @@ void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, Triangle
     skipped = std::min(skipped, meet ? 0 : std::max(found.lower, bound));
     if (found.nearest.upper < kInfinity)
         take(found.nearest, {node_a, node_b, found.triangle_a, found.triangle_b}, bound, meet);
+}
+
+void DistanceSearch::decide_triangles(const MeetingPair& pair, double limit, double bound) noexcept {
+    const PlacedTriangle x = place(a.tree, pair.triangle_a), y = place(b.tree, pair.triangle_b, b_to_a);
+    const auto apart_along = [&](const dvec3& n) {
+        const double along = gap_along(x, y, n);
+        if (along >= limit) skipped = std::min(skipped, std::max(along, bound));
+        return along >= limit;
+    };
+    const auto apart_along_face = [&](const dvec3& m) {
+        const dvec3 n = m / glm::length(m);
+        return apart_along(glm::dot(n, y.corner[0] - x.corner[0]) < 0 ? -n : n);
+    };
+    if (apart_along(normal)) return;
+    if (stats.block_tests > kManyBlocks && (apart_along_face(face_normal(x)) || apart_along_face(face_normal(y))))
+        return;
+    const TriangleDistance found = distance(x, y);
+    take(found, pair, bound, !(found.lower > 0));
 }
 
 bool DistanceSearch::try_first(const MeetingPair& pair) noexcept {

@@ -13,9 +13,12 @@
 //           kLaneMargin |L|, 32 u, is added
 //   lanes   the same for |L^T n|, and for n.c of three products and two sums 6 u |c|; kLaneMargin (|L| + |c|) is added.
 //           The box's sides are exact, and the sum of their products wrong by 5 u of what kLaneMargin is added for
+#include "query/distance/patch-inl.hpp"
 #include "query/node/hull_lanes-inl.hpp"
 #include "query/node/tree_side.hpp"
 #include "query/triangle/support.hpp"
+
+#include "src/slab.hpp"
 
 #include <prolate/query.hpp>
 
@@ -80,10 +83,12 @@ private:
         const uint32_t lane = node % kBlockLanes;
         const std::byte* const block = side_.block(node);
         const auto children = load_le<uint8_t>(block + kBlockCount + lane);
-        if (children > kTriangleLeaf) {
-            const TriangleRange range{first_triangle(block, lane), uint32_t{children} - kTriangleLeaf};
-            return {node, turn_, triangle_support(side_.tree, range, n_), 0};
-        }
+        TriangleRange range{0, 0}; // whose reach is worth knowing at once
+        if (children > kTriangleLeaf)
+            range = {first_triangle(block, lane), uint32_t{children} - kTriangleLeaf};
+        else if (side_.has_slabs)
+            range = patch_at(side_, node);
+        if (range.count > 0) return {node, turn_, triangle_support(side_.tree, range, n_), 0};
         const LaneNode e = load_node(block, lane, side_.lattice.step_exponent);
         const float x = along_[0], y = along_[1], z = along_[2];
         const float v[3] = {e.l11 * x + e.l21 * y + e.l31 * z, e.l22 * y + e.l32 * z, e.l33 * z};
@@ -94,7 +99,8 @@ private:
         const float reach = hull_reach(hull, v[0], v[1], v[2], width);
         const auto stated = load_le<uint8_t>(hull + kHullShare);
         const float share = stated > 0 ? static_cast<float>(stated) * kPerHullShare : 1;
-        return {node, turn_, metres(center + double{reach + kLaneMargin * size}), double{share * width} * step_};
+        return {node, turn_, metres(center + double{reach + kLaneMargin * size}),
+                double{share * width + 2 * kLaneMargin * size} * step_};
     }
 
     // Upper bounds of the lanes of a block, steps from the lattice's origin; NaN becomes infinite.
@@ -133,6 +139,12 @@ private:
                 most = here.most;
                 continue;
             }
+            if (const TriangleRange range = patch_at(side_, e.node_a); range.count > 0) {
+                const double reach = triangle_support(side_.tree, range, n_);
+                if (reach > hopeless) return HUGE_VAL;
+                most = std::max(most, reach);
+                continue;
+            }
             if (++blocks > kMostBlocks) return HUGE_VAL;
             const ChildRange children = children_in(side_.block(e.node_a), e.node_a % kBlockLanes);
             for_each_block(children, [&](uint32_t first, uint32_t count) {
@@ -158,6 +170,57 @@ private:
     double base_ = 0; // n times the lattice's origin, steps
     uint32_t turn_ = 0;
     NodeReach known_[kKnown]; // set with the first turn, which many queries do without
+};
+
+/// Of two trees with triangles: which nodes are far enough from each other along the normal of the nearest pair?
+class AlongNormal {
+public:
+    explicit AlongNormal(DistanceSearch& search) : s_(search), reaches_{ReachAlong(s_.a), ReachAlong(s_.b)} {}
+
+    /// Notes two nodes, which are no nearer than `bound`, if they need not be looked at.
+    HWY_INLINE bool separates(uint32_t node_a, uint32_t node_b, double bound) {
+        return follow() && leave_enough(reaches_[0].of(node_a), reaches_[1].of(node_b), bound);
+    }
+    /// The same, at a closer look if that may settle it.
+    HWY_INLINE bool separates_closely(const Scratch::Entry& e, double bound, Scratch::Entry* stack) {
+        if (!follow()) return false;
+        const NodeReach &a = reaches_[0].of(e.node_a), &b = reaches_[1].of(e.node_b);
+        if (leave_enough(a, b, bound)) return true;
+        const double room = (along_ - s_.enough()) - 2 * kSeparationMargin * s_.reach_of_triangles(); // for both
+        if (a.most + b.most - (a.spare + b.spare) > room) return false;
+        return closer_look(e, bound, room, a, b, stack);
+    }
+
+private:
+    // False if there is no normal yet.
+    HWY_INLINE bool follow() {
+        if (turn_ != s_.normals_found) {
+            turn_ = s_.normals_found;
+            reaches_[0].turn(s_.normal), reaches_[1].turn(-s_.normal_b);
+            along_ = glm::dot(s_.normal, s_.b_to_a.translation);
+        }
+        return turn_ != 0;
+    }
+    HWY_NOINLINE bool closer_look(const Scratch::Entry& e, double bound, double room, NodeReach a, NodeReach b,
+                                  Scratch::Entry* stack) {
+        if (a.spare > 0) {
+            a = reaches_[0].closer(e.node_a, room - b.most, room - (b.most - b.spare), stack);
+            if (leave_enough(a, b, bound)) return true;
+            if (a.most + b.most - b.spare > room) return false;
+        }
+        if (b.spare > 0) b = reaches_[1].closer(e.node_b, room - a.most, room - a.most, stack);
+        return leave_enough(a, b, bound);
+    }
+    HWY_INLINE bool leave_enough(const NodeReach& a, const NodeReach& b, double bound) {
+        const double gap = ((along_ - b.most) - a.most) - kSeparationMargin * s_.reach_of_triangles();
+        const double certain = gap * (1 - 0x1p-50);
+        return certain >= s_.enough() && s_.skips(std::max(certain, bound));
+    }
+
+    DistanceSearch& s_;
+    ReachAlong reaches_[2];
+    uint32_t turn_ = 0; // which normal they are along,
+    double along_ = 0;  // and how far the way from A's origin to B's is
 };
 
 } // namespace prolate::query::HWY_NAMESPACE

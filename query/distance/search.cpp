@@ -8,6 +8,9 @@
 // least bound is as good as the nearest leaves found. First of all one descent to the nearest child each time finds
 // two leaves, and an upper bound.
 //
+// Two nodes with few triangles below them, all in leaves, are not opened, but all these are tested against each other
+// (patch-inl.hpp).
+//
 // Once there is a nearest pair, others are also looked at along its normal (reach-inl.hpp): they may be far enough from
 // each other along it. That takes no part in the budget, of which it is a fraction.
 //
@@ -19,15 +22,16 @@
 // Memory: the pairs in the heap fill the caller's scratch at most. When it is full, pairs are searched depth first,
 // which takes some more tests, until there is room.
 //
-// Complexity: pairs of nodes whose bound is below the distance; for two fine meshes, 30 to 70 block tests.
+// Complexity: pairs of nodes whose bound is below the distance; for two fine meshes, 25 to 50 block tests.
 #include "query/simd/targets.hpp"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/distance/search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/distance/patch-inl.hpp"
 #include "query/distance/reach-inl.hpp"
-#include "query/distance/search.hpp"
+#include "query/distance/state.hpp"
 #include "query/inside/enclosure.hpp"
 #include "query/node/best_first.hpp"
 #include "query/node/distance_lanes-inl.hpp"
@@ -86,7 +90,7 @@ public:
     DistanceTraversal(DistanceSearch& search, double by_slabs) // a bound on the distance of the roots
         : s_(search),
           heap_(search.entries), sides_{{search.a, search.lattice_b_to_a}, {search.b, search.lattice_a_to_b}},
-          reaches_{ReachAlong(search.a), ReachAlong(search.b)}, by_slabs_(by_slabs), room_(search.room) {}
+          by_slabs_(by_slabs), room_(search.room) {}
 
     void run() {
         search();
@@ -109,12 +113,16 @@ private:
         }
         if (!near) return done(true);
         for (bool descending = true;;) {
-            if (beyond_normal(e)) {
+            const TwoPatches patches = patches_at(e);
+            if (beyond_normal(e, patches.some())) {
                 descending = false;
-            } else if (are_leaves(e.flags)) {
-                if (!s_.decide(e.node_a, e.node_b, bound_of(e))) return stop_at(e);
+            } else if (are_leaves(e.flags) || patches.some()) {
+                const bool one = descending && patches.some(); // then again, along the normal
+                if (!(one ? patches_.find_one(e, patches.a, patches.b, bound_of(e)) : decide(e, patches)))
+                    return stop_at(e);
                 if (s_.overlapping) return;
                 descending = false;
+                if (one) continue;
             } else if (too_deep(e) && !descending) {
                 s_.open = std::min(s_.open, bound_of(e));
             } else {
@@ -137,60 +145,36 @@ private:
             }
             if (heap_.empty()) return done(true);
             e = heap_.pop();
-            if (skips(bound_of(e))) return done(true);
+            if (s_.skips(bound_of(e))) return done(true);
         }
     }
 
+    // Of a pair of nodes, if all that is below them is to be decided at once; else empty.
+    struct TwoPatches {
+        TriangleRange a{0, 0}, b{0, 0};
+        bool some() const { return a.count > 0 && b.count > 0; }
+    };
+    HWY_INLINE TwoPatches patches_at(const Entry& e) const {
+        if (!all_triangles_ || !no_limit_) return {};
+        const TriangleRange a = patch_at(sides_[0], e.node_a);
+        return {a, a.count > 0 ? patch_at(sides_[1], e.node_b) : TriangleRange{0, 0}};
+    }
+    bool decide(const Entry& e, const TwoPatches& patches) {
+        return patches.some() ? patches_.decide(e, patches.a, patches.b, bound_of(e))
+                              : s_.decide(e.node_a, e.node_b, bound_of(e));
+    }
     uint64_t budget() const { return s_.left(); }
     double bound_of(const Entry& e) const { return base_ + double{e.bound}; }
     bool too_deep(const Entry& e) const { return query::too_deep(e, sides_[0], sides_[1]); }
-    // Notes a pair that need not be looked at.
-    bool skips(double bound) {
-        if (!(bound >= s_.enough())) return false;
-        s_.skipped = std::min(s_.skipped, bound);
-        return true;
-    }
-    // Are two nodes far enough from each other along the normal of the nearest pair (reach-inl.hpp)? Ellipsoids reach
-    // so far beyond their neighbours that it does not pay.
-    HWY_INLINE bool beyond_normal(uint32_t node_a, uint32_t node_b, double bound) {
-        return all_triangles_ && follow_normal() && leave_enough(reaches_[0].of(node_a), reaches_[1].of(node_b), bound);
-    }
-    // The same of a pair that comes up. Inner nodes take a closer look if that may settle it; not where a level ends
-    // the search, for the reason given at no_limit_.
-    HWY_INLINE bool beyond_normal(const Entry& e) { return all_triangles_ && look_along_normal(e); }
-    HWY_INLINE bool look_along_normal(const Entry& e) {
+    // Is a pair that comes up far enough apart along the normal of the nearest one? Where a level ends the search, only
+    // leaves are asked, for the reason given at no_limit_. Ellipsoids reach so far beyond their neighbours that it does
+    // not pay.
+    HWY_INLINE bool beyond_normal(const Entry& e, bool patches) {
+        if (!all_triangles_) return false;
         const double bound = bound_of(e);
-        if (are_leaves(e.flags)) return beyond_normal(e.node_a, e.node_b, bound);
-        if (!no_limit_ || bound < kNearlyEnough * s_.enough() || !follow_normal()) return false;
-        const NodeReach &a = reaches_[0].of(e.node_a), &b = reaches_[1].of(e.node_b);
-        if (leave_enough(a, b, bound)) return true;
-        const double room = (along_ - s_.enough()) - 2 * kSeparationMargin * s_.reach_of_triangles(); // for both
-        if (a.most + b.most - (a.spare + b.spare) > room) return false;
-        return closer_look(e, room, a, b);
-    }
-    HWY_NOINLINE bool closer_look(const Entry& e, double room, NodeReach a, NodeReach b) {
-        Entry* const stack = s_.entries + heap_.size();
-        if (a.spare > 0) {
-            a = reaches_[0].closer(e.node_a, room - b.most, room - (b.most - b.spare), stack);
-            if (leave_enough(a, b, bound_of(e))) return true;
-            if (a.most + b.most - b.spare > room) return false;
-        }
-        if (b.spare > 0) b = reaches_[1].closer(e.node_b, room - a.most, room - a.most, stack);
-        return leave_enough(a, b, bound_of(e));
-    }
-    HWY_INLINE bool leave_enough(const NodeReach& a, const NodeReach& b, double bound) {
-        const double gap = ((along_ - b.most) - a.most) - kSeparationMargin * s_.reach_of_triangles();
-        const double certain = gap * (1 - 0x1p-50);
-        return certain >= s_.enough() && skips(std::max(certain, bound));
-    }
-    // False if there is no normal yet.
-    HWY_INLINE bool follow_normal() {
-        if (turn_ != s_.normals_found) {
-            turn_ = s_.normals_found;
-            reaches_[0].turn(s_.normal), reaches_[1].turn(-s_.normal_b);
-            along_ = glm::dot(s_.normal, s_.b_to_a.translation);
-        }
-        return turn_ != 0;
+        if (are_leaves(e.flags)) return normal_.separates(e.node_a, e.node_b, bound);
+        return no_limit_ && (patches || bound >= kNearlyEnough * s_.enough()) &&
+               normal_.separates_closely(e, bound, s_.entries + heap_.size());
     }
     // The search ends here: what is in the heap is open, or if `complete` only not better than what was skipped.
     void done(bool complete) {
@@ -213,7 +197,7 @@ private:
         base_ = std::isfinite(bound) ? std::max(bound, 0.0) : root_bound(s_);
         base_ = std::max(base_, by_slabs_);
         e = {0, 0, 0, root_flags(s_.a.tree, s_.b.tree, bounds.size[0] > one.single.size)};
-        return !skips(base_);
+        return !s_.skips(base_);
     }
 
     // Puts the children of a pair that are not skipped into children_, the nearest last; false if the budget is too
@@ -267,14 +251,15 @@ private:
             if (have_hulls_) {
                 const std::byte* const hull = leaf ? nullptr : hull_of(side.hulls, block, lane);
                 lower += side.step * hulls_add(bounds, lane, one.single.size, hull_one, hull);
-                if (skips(lower)) continue;
+                if (s_.skips(lower)) continue;
                 if (slabs_pay() && (may_have_slab(hull_one) || may_have_slab(hull))) {
                     lower = slabs_add(lower, bounds, lane, open, other, hull_one, first + lane, hull);
-                    if (skips(lower)) continue;
+                    if (s_.skips(lower)) continue;
                 }
             }
             const uint32_t node = first + lane;
-            if (leaf && other_leaf != 0 && beyond_normal(open != 0 ? other : node, open != 0 ? node : other, lower))
+            if (leaf && other_leaf != 0 && all_triangles_ &&
+                normal_.separates(open != 0 ? other : node, open != 0 ? node : other, lower))
                 continue;
             const bool open_this = !leaf && (other_leaf != 0 || bounds.size[lane] > one.single.size);
             if (open_this || (leaf && other_leaf != 0)) prefetch(side, block, lane, leaf);
@@ -331,10 +316,11 @@ private:
         bool within = true;
         while (size > 0 && !s_.overlapping) {
             const Entry e = stack[--size];
-            if (skips(bound_of(e)) || beyond_normal(e.node_a, e.node_b, bound_of(e))) continue;
-            const bool leaves = are_leaves(e.flags);
-            if (leaves || !too_deep(e))
-                within = within && (leaves ? s_.decide(e.node_a, e.node_b, bound_of(e)) : open(e));
+            if (s_.skips(bound_of(e)) || (all_triangles_ && normal_.separates(e.node_a, e.node_b, bound_of(e))))
+                continue;
+            const TwoPatches patches = patches_at(e);
+            const bool leaves = are_leaves(e.flags) || patches.some();
+            if (leaves || !too_deep(e)) within = within && (leaves ? decide(e, patches) : open(e));
             if (!within || (!leaves && too_deep(e)))
                 s_.open = std::min(s_.open, bound_of(e));
             else if (!leaves)
@@ -352,9 +338,8 @@ private:
     const bool no_limit_ = s_.a.limit_from == UINT32_MAX && s_.b.limit_from == UINT32_MAX;
     const bool have_slabs_ = (s_.a.has_slabs || s_.b.has_slabs) && no_limit_;
     const bool all_triangles_ = s_.a.tree.has_triangles() && s_.b.tree.has_triangles();
-    ReachAlong reaches_[2];
-    uint32_t turn_ = 0;     // which normal they are along,
-    double along_ = 0;      // and how far the way from A's origin to B's is
+    Patches patches_{s_};
+    AlongNormal normal_{s_};
     const double by_slabs_; // a bound of the roots
     double base_ = 0;       // bound of the roots, metres
     uint32_t room_;         // of the heap: what depth_first() needs is kept free

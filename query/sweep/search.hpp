@@ -37,7 +37,7 @@ struct SweepSearch {
     MotionFrame frame_a{}, frame_b{};
 
     /// At the start, does one body hold a part of the other? Settled before the traversal, as in
-    /// query/distance/search.hpp.
+    /// query/distance/state.hpp.
     Verdict enclosure = Verdict::separated;
     bool complete = false; ///< no budget ran out
     double open = 1;       ///< pairs that were not looked at keep apart until then

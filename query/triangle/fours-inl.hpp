@@ -15,6 +15,7 @@
 
 #include "query/ellipsoid/separation.hpp"
 #include "query/triangle/lanes-inl.hpp"
+#include "src/layout.hpp"
 
 #include <prolate/tree.hpp>
 
@@ -29,6 +30,25 @@ namespace prolate::query::HWY_NAMESPACE {
 // Vectors of four. Nothing is read by longer vectors than it was written by, for that would have to wait until the
 // writes have reached the cache.
 constexpr size_t kFour = 4;
+
+// A vertex as it stands in the file; the fourth coordinate means nothing.
+HWY_INLINE void load_vertex(const TreeView& tree, uint32_t vertex, float (&out)[4]) {
+    load_le(tree.raw().vertices() + size_t{vertex} * kVertexBytes, out); // behind it there are 6 bytes of a triangle
+}
+// From one vertex a row to one coordinate a row, but for the fourth.
+HWY_INLINE void transpose(const float (&vertex)[kFour][4], float* x, float* y, float* z) {
+#if HWY_TARGET == HWY_SCALAR
+    for (size_t i = 0; i < kFour; ++i) x[i] = vertex[i][0], y[i] = vertex[i][1], z[i] = vertex[i][2];
+#else
+    const QuadTag d;
+    const Quad first = load<Quad>(vertex[0]), second = load<Quad>(vertex[1]), third = load<Quad>(vertex[2]),
+               fourth = load<Quad>(vertex[3]);
+    const Quad odd = hn::InterleaveLower(d, first, third), even = hn::InterleaveLower(d, second, fourth);
+    store(hn::InterleaveLower(d, odd, even), x);
+    store(hn::InterleaveUpper(d, odd, even), y);
+    store(hn::InterleaveLower(d, hn::InterleaveUpper(d, first, third), hn::InterleaveUpper(d, second, fourth)), z);
+#endif
+}
 
 // One to four triangles of a leaf, one a lane; row 3 i + k is coordinate k of corner i.
 class FourTriangles {
@@ -83,33 +103,14 @@ private:
         const std::byte* index = tree.raw().triangles() + size_t{first} * 3 * sizeof(Index);
         alignas(16) float corner[3][kFour][4] = {}; // the fourth coordinate means nothing
         for (uint32_t i = 0; i < count_; ++i)
-            for (auto& of_all : corner) { // behind the vertices there are at least the 6 bytes of a triangle
-                load_le(tree.raw().vertices() + size_t{load_le<Index>(index)} * 3 * sizeof(float), of_all[i]);
+            for (auto& of_all : corner) {
+                load_vertex(tree, load_le<Index>(index), of_all[i]);
                 index += sizeof(Index);
             }
-        for (size_t c = 0; c < 3; ++c) transpose(corner[c], 3 * c);
+        for (size_t c = 0; c < 3; ++c) transpose(corner[c], rows_[3 * c], rows_[3 * c + 1], rows_[3 * c + 2]);
     }
-    void transpose(const float (&corner)[kFour][4], size_t row) {
-#if HWY_TARGET == HWY_SCALAR
-        for (size_t k = 0; k < 3; ++k)
-            for (size_t i = 0; i < kFour; ++i) rows_[row + k][i] = corner[i][k];
-#else
-        const QuadTag d;
-        const Quad first = load<Quad>(corner[0]), second = load<Quad>(corner[1]), third = load<Quad>(corner[2]),
-                   fourth = load<Quad>(corner[3]);
-        const Quad odd = hn::InterleaveLower(d, first, third), even = hn::InterleaveLower(d, second, fourth);
-        store(hn::InterleaveLower(d, odd, even), rows_[row]);
-        store(hn::InterleaveUpper(d, odd, even), rows_[row + 1]);
-        store(hn::InterleaveLower(d, hn::InterleaveUpper(d, first, third), hn::InterleaveUpper(d, second, fourth)),
-              rows_[row + 2]);
-#endif
-    }
-    Quad stored_from_first(size_t row, size_t i) const {
-        return at(row, i) - origin_[row % 3];
-    }
-    Quad at(size_t row, size_t i) const {
-        return load<Quad>(rows_[row] + i);
-    }
+    Quad stored_from_first(size_t row, size_t i) const { return at(row, i) - origin_[row % 3]; }
+    Quad at(size_t row, size_t i) const { return load<Quad>(rows_[row] + i); }
     // Returns the sizes of what it stores, 0 in lanes without a triangle.
     Quad put(size_t row, size_t i, Quad x) {
         store(x, rows_[row] + i);

@@ -696,7 +696,7 @@ TEST(ExactQuery, FlatBodiesAgreeWithBruteForce) {
             ASSERT_EQ(c.verdict, Verdict::separated);
             ++separated;
         }
-        if (tilt == 0 && gap > 1e-6) ++parallel, few += d.stats.tests() < 500 && c.stats.tests() < 20;
+        if (tilt == 0 && gap > 1e-6) ++parallel, few += d.stats.tests() < 1000 && c.stats.tests() < 20;
     }
     EXPECT_GT(separated, 100u);
     EXPECT_GT(parallel, 50u);

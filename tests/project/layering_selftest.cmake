@@ -70,7 +70,7 @@ plant(bad query/distance/planted.cpp "#include \"query/collide/search.hpp\"")
 plant(bad query/collide/planted.cpp "#include \"query/contacts/manifold.hpp\"")
 plant(bad query/unknown/planted.cpp "#include \"query/simd/targets.hpp\"")
 plant(good query/contacts/planted.cpp "#include \"query/collide/search.hpp\"")
-plant(good query/distance/planted.cpp "#include \"query/distance/search.hpp\"")
+plant(good query/distance/planted.cpp "#include \"query/distance/state.hpp\"")
 plant(good query/world/planted.cpp "#include \"query/inside/inside.hpp\"")
 # builder knows neither query nor GLM; pugixml is for the reader of DAE only.
 plant(bad builder/planted.cpp "#include <prolate/query.hpp>")

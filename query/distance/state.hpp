@@ -51,8 +51,15 @@ struct DistanceSearch {
     /// Pairs whose bound is at least this, > 0, need not be looked at: they cannot improve the answer by more than the
     /// tolerance, nor meet.
     double enough() const {
-        const double improving = upper < kInfinity ? upper - tolerance(upper) : kInfinity;
+        // Not less by its rounding: pairs are left out just here.
+        const double improving = upper < kInfinity ? (upper - tolerance(upper)) * (1 + 0x1p-52) : kInfinity;
         return std::max(std::min(options.max_distance, improving), std::numeric_limits<double>::min());
+    }
+    /// Notes a pair of this bound if it need not be looked at.
+    bool skips(double bound) {
+        if (!(bound >= enough())) return false;
+        skipped = std::min(skipped, bound);
+        return true;
     }
     /// How far bounds around this distance may be from each other.
     double tolerance(double distance) const {
@@ -70,7 +77,10 @@ struct DistanceSearch {
     /// Decides on two leaves that are not nearer than `bound`. Sets `overlapping` if they meet. False, and nothing
     /// done, if the budget may not suffice.
     bool decide(uint32_t node_a, uint32_t node_b, double bound) noexcept;
-    /// The same for what an earlier query found, which is not trusted to be of these trees.
+    /// Decides on two triangles, of leaves that are not nearer than `bound`, which do not matter if they are at least
+    /// `limit` apart. Does not count them.
+    void decide_triangles(const MeetingPair& pair, double limit, double bound) noexcept;
+    /// The same as decide() for what an earlier query found, which is not trusted to be of these trees.
     bool try_first(const MeetingPair& pair) noexcept;
 
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
