@@ -182,6 +182,7 @@ public:
     World& operator=(World&&) noexcept = default;
 
     struct State; ///< internal
+    friend const State& state_of(const World& world) noexcept;
 
 private:
     struct Deleter {

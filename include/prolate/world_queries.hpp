@@ -119,7 +119,8 @@ struct RayHit {
                           ///< the lowest index
     RaycastResult result; ///< of all bodies together: `clear`, `stats`, and if no hit was found the verdict
 };
-/// Where do rays first meet a body? A half-space is met at its plane, or where the ray begins, in it.
+/// Where do rays first meet a body? A half-space is met at its plane, or where the ray begins, in it. Rays of which
+/// neighbours go much the same way, as those of a picture, take less time together than one by one, for the same bits.
 Result<void> raycast(const World& world, std::span<const Ray> rays, std::span<RayHit> out, const Workers& workers,
                      const QueryOptions& options = {}, uint32_t mask = ~uint32_t{}) noexcept;
 

@@ -20,6 +20,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory_resource>
+#include <utility>
 #include <vector>
 
 namespace prolate::query {
@@ -59,6 +60,20 @@ public:
     uint32_t root() const noexcept { return root_; } // kNone if empty
     uint32_t node_count() const noexcept { return static_cast<uint32_t>(nodes_.size()) - free_count_; }
 
+    /// Where a walk has come to: it goes on from one leaf to the next when it is asked to.
+    class Walk {
+    public:
+        explicit Walk(const BoundsTree& tree) : node_(tree.root_) {}
+        /// The item of the next leaf that enters(box) holds for, as walk() has them; kNone at the end. enters() may
+        /// hold for fewer boxes than before. The tree must be the same.
+        template <class Enters, class SecondFirst>
+        uint32_t next(const BoundsTree& tree, Enters&& enters, SecondFirst&& second_first);
+
+    private:
+        uint32_t node_;      // kNone at the end
+        bool begun_ = false; // then node_ has been seen
+    };
+
     /// Calls leaf(item) for the leaves that enters(box) holds for, as it must for all boxes above them; ends when
     /// leaf() returns false. second_first(box, box of its sibling) tells, for the first child of a node, whether its
     /// sibling comes first; the answer must be the same during a walk.
@@ -92,30 +107,39 @@ private:
     uint32_t free_count_ = 0;
 };
 
-template <class Enters, class SecondFirst, class Leaf>
-void BoundsTree::walk(Enters&& enters, SecondFirst&& second_first, Leaf&& leaf) const {
+template <class Enters, class SecondFirst>
+uint32_t BoundsTree::Walk::next(const BoundsTree& tree, Enters&& enters, SecondFirst&& second_first) {
+    const auto& nodes = tree.nodes_;
     const auto first = [&](const Node& parent) {
-        return second_first(nodes_[parent.child[0]].box, nodes_[parent.child[1]].box) ? 1 : 0;
+        return second_first(nodes[parent.child[0]].box, nodes[parent.child[1]].box) ? 1 : 0;
     };
-    for (uint32_t node = root_; node != kNone;) {
-        if (enters(nodes_[node].box)) {
-            if (!is_leaf(node)) {
-                node = nodes_[node].child[first(nodes_[node])];
-                continue;
-            }
-            if (!leaf(item(node))) return;
+    bool leave = std::exchange(begun_, true);
+    while (node_ != kNone) {
+        if (!leave && enters(nodes[node_].box)) {
+            if (tree.is_leaf(node_)) return tree.item(node_);
+            node_ = nodes[node_].child[first(nodes[node_])];
+            continue;
         }
+        leave = false;
         for (;;) { // to the sibling of the nearest ancestor that has not been left yet
-            const uint32_t parent = nodes_[node].parent;
-            if (parent == kNone) return;
-            const int way = first(nodes_[parent]);
-            if (node == nodes_[parent].child[way]) {
-                node = nodes_[parent].child[1 - way];
+            const uint32_t parent = nodes[node_].parent;
+            if (parent == kNone) return node_ = kNone;
+            const int way = first(nodes[parent]);
+            if (node_ == nodes[parent].child[way]) {
+                node_ = nodes[parent].child[1 - way];
                 break;
             }
-            node = parent;
+            node_ = parent;
         }
     }
+    return kNone;
+}
+
+template <class Enters, class SecondFirst, class Leaf>
+void BoundsTree::walk(Enters&& enters, SecondFirst&& second_first, Leaf&& leaf) const {
+    Walk walk(*this);
+    for (uint32_t item; (item = walk.next(*this, enters, second_first)) != kNone;)
+        if (!leaf(item)) return;
 }
 
 } // namespace prolate::query

@@ -2,6 +2,7 @@
 #include "query/node/limits.hpp"
 #include "query/world/bounds.hpp"
 #include "query/world/jobs.hpp"
+#include "query/world/rays.hpp"
 #include "query/world/two_bodies.hpp"
 
 #include <prolate/world_queries.hpp>
@@ -17,7 +18,8 @@ namespace {
 
 using glm::dvec3;
 
-constexpr uint32_t kGrain = 2; // questions, each to many bodies
+constexpr uint32_t kGrain = 2;                           // questions, each to many bodies
+constexpr uint32_t kRayGrain = query::kRaysUnderWay / 2; // rays share what they come to
 
 Result<void> check(size_t questions, size_t room, const Workers& workers) {
     if (room < questions || questions > UINT32_MAX) return query::kSpanTooShort;
@@ -28,36 +30,6 @@ Result<void> check(size_t questions, size_t room, const Workers& workers) {
 // The float above: whatever is hit at t is hit before it.
 float above(double t) {
     return std::nextafter(static_cast<float>(t), std::numeric_limits<float>::infinity());
-}
-
-RayHit first_hit(const World& world, const Ray& ray, Scratch context, const QueryOptions& options, uint32_t mask) {
-    RayHit out;
-    const dvec3 o = query::to_double(ray.origin), d = query::to_double(ray.direction);
-    if (!std::isfinite(glm::length(o) + glm::length(d)) || d == dvec3(0) || std::isnan(ray.max_t)) return out;
-    const dvec3 low = o - double{options.margin}, high = o + double{options.margin};
-    const Bounds box{{query::round_down(low.x), query::round_down(low.y), query::round_down(low.z)},
-                     {query::round_up(high.x), query::round_up(high.y), query::round_up(high.z)}};
-    double clear = ray.max_t;
-    bool undecided = false;
-    QueryStats stats;
-    world.cast(
-        box, ray.direction, ray.max_t,
-        [&](BodyId id, float until) {
-            const RaycastResult r =
-                query::raycast(*world.find(id), {ray.origin, ray.direction, until}, context, options);
-            query::add(r.stats, stats);
-            if (r.verdict == Verdict::undecided) undecided = true;
-            if (r.verdict != Verdict::separated) clear = std::min(clear, r.clear);
-            const bool first =
-                out.body == BodyId{} || r.t < out.result.t || (r.t == out.result.t && id.index < out.body.index);
-            if (r.verdict != Verdict::overlapping || !first) return until;
-            out = {.body = id, .result = r};
-            return std::min(until, above(r.t));
-        },
-        mask);
-    if (out.body == BodyId{} && !undecided) out.result.verdict = Verdict::separated;
-    out.result.clear = clear, out.result.stats = stats;
-    return out;
 }
 
 // Ids in ascending order in the room there is: the lowest of them.
@@ -126,11 +98,10 @@ SweepHit first_hit(const World& world, const MovingTree& moving, Scratch context
 Result<void> raycast(const World& world, std::span<const Ray> rays, std::span<RayHit> out, const Workers& workers,
                      const QueryOptions& query_options, uint32_t mask) noexcept {
     if (const auto good = check(rays.size(), out.size(), workers); !good) return good;
-    const QueryOptions options = query::sound(query_options);
-    query::for_ranges(workers.jobs, static_cast<uint32_t>(rays.size()), kGrain,
+    query::for_ranges(workers.jobs, static_cast<uint32_t>(rays.size()), kRayGrain,
                       [&](uint32_t begin, uint32_t end, uint32_t worker) {
-                          for (uint32_t i = begin; i < end; ++i)
-                              out[i] = first_hit(world, rays[i], workers.contexts[worker], options, mask);
+                          query::cast_rays(world, rays.subspan(begin, end - begin), out.subspan(begin, end - begin),
+                                           workers.contexts[worker], query::sound(query_options), mask);
                       });
     return {};
 }

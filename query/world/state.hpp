@@ -119,6 +119,10 @@ struct World::State {
     WorldStats stats;
 };
 
+inline const World::State& state_of(const World& world) noexcept {
+    return *world.state_;
+}
+
 namespace query {
 
 /// Does no point of the box lie in the half-space, or within the margin of it?

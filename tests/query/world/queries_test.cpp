@@ -558,6 +558,49 @@ TEST(WorldQueries, RaysHitWhatIsFirst) {
     }
 }
 
+TEST(WorldQueries, RaysAreAnsweredTogetherAsAlone) {
+    Random random(9);
+    Scene scene(random, 60, 6);
+    std::vector<Ray> rays; // of a picture, then random ones among them, then only those
+    for (uint32_t i = 0; i < 1500; ++i) {
+        const Point o = random.in_ball(), d = random.direction();
+        if (i < 1000 && i % 20 != 7)
+            rays.push_back({{0.2f * static_cast<float>(i % 40) - 4, 0.3f * static_cast<float>(i / 40) - 4, 9},
+                            {0, 0, -1},
+                            i % 9 == 4 ? 8.0f : kInfinity});
+        else
+            rays.push_back({scenes::to_float({8 * o[0], 8 * o[1], 8 * o[2]}), scenes::to_float(d)});
+    }
+    rays[3].direction = {}, rays[70].max_t = -1, rays[71].origin.x = kNan;
+    for (const QueryOptions& options :
+         {QueryOptions{}, QueryOptions{.margin = 0.1f}, QueryOptions{.max_pair_tests = 40}}) {
+        std::vector<RayHit> hits(rays.size());
+        ASSERT_TRUE(raycast(scene.world, rays, hits, {scene.contexts}, options));
+        std::array<uint32_t, 3> of_verdict{};
+        for (size_t i = 0; i < rays.size(); ++i) {
+            RayHit alone;
+            ASSERT_TRUE(raycast(scene.world, {&rays[i], 1}, {&alone, 1}, {scene.contexts}, options));
+            const RaycastResult &a = hits[i].result, &b = alone.result;
+            ASSERT_EQ(hits[i].body, alone.body) << i;
+            ASSERT_EQ(a.verdict, b.verdict) << i;
+            EXPECT_EQ(a.t, b.t) << i;
+            EXPECT_EQ(a.clear, b.clear) << i;
+            EXPECT_EQ(a.node, b.node) << i;
+            EXPECT_EQ(a.triangle, b.triangle) << i;
+            EXPECT_EQ(a.stats.tests(), b.stats.tests()) << i;
+            EXPECT_EQ(a.stats.block_tests, b.stats.block_tests) << i;
+            if (a.verdict == Verdict::overlapping) {
+                EXPECT_EQ(a.point.z, b.point.z) << i;
+                EXPECT_EQ(a.normal.x, b.normal.x) << i;
+            }
+            ++of_verdict[static_cast<size_t>(a.verdict)];
+        }
+        EXPECT_GT(of_verdict[0], 50u);
+        EXPECT_GT(of_verdict[1], 300u);
+        EXPECT_GE(of_verdict[2], 2u);
+    }
+}
+
 TEST(WorldQueries, ProbesFindAllThatMeetsThem) {
     Random random(9);
     Scene scene(random, 60, 5);
