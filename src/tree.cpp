@@ -134,7 +134,8 @@ void TreeView::find_root() noexcept {
     root_ = ellipsoid(0), root_bound_ = bound(0);
     detail::RootVolume& root = raw_.root_;
     root = has_triangles() ? volume_of_vertices(*this) : volume_of(root_bound_);
-    root.reach = std::hypot(root.center[0], root.center[1], root.center[2]) + root.radius;
+    const auto& c = root.center;
+    root.reach = std::sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) + root.radius;
 }
 
 // With the first `count` levels.

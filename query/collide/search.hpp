@@ -79,7 +79,7 @@ private:
 
 /// The bodies are certainly so far apart, metres, by spheres around their roots; NaN if the pose is not finite.
 double gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept;
-/// The same by the boxes of their roots, along the sides of these.
+/// The same by the boxes of their roots; if they are apart along a side, no axis across two sides is asked.
 double gap_of_boxes(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept;
 /// Does the pair that a cache names exist?
 bool names_leaves(const MeetingPair& pair, const TreeView& a, const TreeView& b) noexcept;

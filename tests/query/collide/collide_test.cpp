@@ -1,4 +1,5 @@
 // Tree against tree: what the traversal promises, on synthetic trees over point clouds.
+#include "query/collide/search.hpp"
 #include "tests/exact_scenes.hpp"
 #include "tests/reference.hpp"
 #include "tests/scenes.hpp"
@@ -13,6 +14,7 @@
 #include <cstring>
 #include <limits>
 #include <new>
+#include <numbers>
 #include <type_traits>
 #include <vector>
 
@@ -382,6 +384,30 @@ TEST(Collide, RootVolumesAreTight) {
             ASSERT_EQ(root.center[i] + root.half[i], high[i]);
         }
         ASSERT_DOUBLE_EQ(root.radius, farthest);
+    }
+}
+
+// Two cubes, each turned by 15 degrees, edge over crossed edge: no side of either tells them apart.
+TEST(Collide, BoxesOfRootsAreApartAlongAnAxisAcrossTheirEdges) {
+    const scenes::ExactScene cube = scenes::exact_tree(shapes::box());
+    const TreeView tree = *TreeView::open(cube.bytes), smaller = *tree.scaled(0.75f);
+    const detail::RootVolume& root = tree.raw().root();
+    constexpr double kTurn = std::numbers::pi / 12;
+    const double top = (std::sin(kTurn) + std::cos(kTurn)) * root.half[0]; // of an edge over the center
+    const float s = static_cast<float>(std::sin(kTurn / 2)), c = static_cast<float>(std::cos(kTurn / 2));
+    const auto gap_at = [&](double distance) { // of centers, along z
+        Pose a{{}, {s, 0, 0, c}}, b{{}, {0, s, 0, c}};
+        for (Pose* const p : {&a, &b}) {
+            const float scale = p == &a ? 1 : 0.75f;
+            const Point at =
+                scenes::rotate(p->rotation, {scale * root.center[0], scale * root.center[1], scale * root.center[2]});
+            p->translation = scenes::to_float({-at[0], -at[1], (p == &a ? 0 : distance) - at[2]});
+        }
+        return query::gap_of_boxes(tree, smaller, query::relative_pose(a, b));
+    };
+    for (const double gap : {1e-4, 1e-3, 5e-3}) { // beyond, sides tell
+        EXPECT_NEAR(gap_at(1.75 * top + gap), gap, 1e-6);
+        EXPECT_LT(gap_at(1.75 * top - gap), 0);
     }
 }
 
