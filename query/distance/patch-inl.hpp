@@ -149,7 +149,7 @@ public:
                              double bound) {
         begin(e, in_a, in_b, bound);
         look_along_normal();
-        const auto count = static_cast<uint32_t>(std::popcount(left_a_) * std::popcount(left_b_));
+        const auto count = static_cast<uint32_t>(std::popcount(left_[0]) * std::popcount(left_[1]));
         if (count > s_.left()) return false;
         s_.stats.triangle_tests += count;
         if (count < in_a.count * in_b.count) note_skipped();
@@ -172,12 +172,15 @@ private:
 
     void begin(const Scratch::Entry& e, const TriangleRange& in_a, const TriangleRange& in_b, double bound) {
         entry_ = &e, bound_ = bound, set_limit(s_.enough());
-        a_ = &placed(0, s_.a.tree, in_a), b_ = &placed(1, s_.b.tree, in_b);
-        between_ = (b_->origin - a_->origin) * unit_;
-        for (size_t k = 0; k < 3; ++k) way_[k] = static_cast<float>(between_[static_cast<glm::length_t>(k)]);
-        lengths_ = a_->radius + b_->radius + static_cast<float>(glm::length(between_));
+        patch_[0] = &placed(0, s_.a.tree, in_a), patch_[1] = &placed(1, s_.b.tree, in_b);
+        between_ = (patch_[1]->origin - patch_[0]->origin) * unit_;
+        for (size_t k = 0; k < 3; ++k) {
+            way_[0][k] = static_cast<float>(between_[static_cast<glm::length_t>(k)]);
+            way_[1][k] = -way_[0][k];
+        }
+        lengths_ = patch_[0]->radius + patch_[1]->radius + static_cast<float>(glm::length(between_));
         margin_ = rounded_up(double{kPatchMargin * lengths_} + kSeparationMargin);
-        left_a_ = (1u << in_a.count) - 1, left_b_ = (1u << in_b.count) - 1;
+        left_[0] = (1u << in_a.count) - 1, left_[1] = (1u << in_b.count) - 1;
         turn_ = 0, room_ = nearly_ = -HUGE_VALF;
     }
 
@@ -208,10 +211,10 @@ private:
             }
             return best;
         };
-        const glm::vec3 way(way_[0], way_[1], way_[2]);
+        const glm::vec3 way(way_[0][0], way_[0][1], way_[0][2]);
+        const Patch &a = *patch_[0], &b = *patch_[1];
         uint32_t i = 0, j = 0;
-        for (int turn = 0; turn < 2; ++turn)
-            j = nearest(*b_, a_->center_of(i) - way), i = nearest(*a_, b_->center_of(j) + way);
+        for (int turn = 0; turn < 2; ++turn) j = nearest(b, a.center_of(i) - way), i = nearest(a, b.center_of(j) + way);
         decide_pair(i, j);
     }
 
@@ -219,82 +222,90 @@ private:
     // from B's. Those that are far enough from all of the other patch are left no more.
     void look_along_normal() {
         turn_ = s_.normals_found;
-        std::fill(exact_a_, exact_a_ + a_->range.count, kUnknown);
-        std::fill(exact_b_, exact_b_ + b_->range.count, kUnknown);
+        for (size_t side = 0; side < 2; ++side)
+            std::fill(exact_reach_[side], exact_reach_[side] + patch_[side]->range.count, kUnknown);
         if (turn_ == 0 || !(limit_ < DistanceSearch::kInfinity)) return;
         const float n[3] = {static_cast<float>(s_.normal.x), static_cast<float>(s_.normal.y),
                             static_cast<float>(s_.normal.z)};
         const glm::dvec3 exact(n[0], n[1], n[2]);
-        const Float highest_a = reaches(*a_, set(n), reach_a_), highest_b = reaches(*b_, -set(n), reach_b_);
-        const double margin = double{kPatchMargin * (a_->radius + b_->radius)} + kSeparationMargin;
+        const Float most[2] = {reaches(0, set(n)), reaches(1, -set(n))};
+        const double margin = double{kPatchMargin * (patch_[0]->radius + patch_[1]->radius)} + kSeparationMargin;
         const double enough = limit_ * unit_ * glm::length(exact) * (1 + 0x1p-50) + margin;
         room_ = static_cast<float>(glm::dot(between_, exact) - enough);
         nearly_ = static_cast<float>(glm::dot(between_, exact) - enough + 2 * margin);
-        leave_out(*a_, highest_b, reach_a_, left_a_), leave_out(*b_, highest_a, reach_b_, left_b_);
+        leave_out(0, most[1]), leave_out(1, most[0]);
     }
     // Returns the most, in all lanes.
-    static Float reaches(const Patch& patch, const Float3& n, float (&out)[kPatchTriangles]) {
+    Float reaches(size_t side, const Float3& n) {
+        const Patch& patch = *patch_[side];
         Float most = set(-HUGE_VALF);
         for (size_t lane = 0; lane < patch.padded(); lane += kFloatLanes) {
             const auto along = [&](size_t k) { return dot(n, load(patch.corner[k], lane)); };
             const Float reach = max(along(0), along(1), along(2));
-            store(reach, out + lane);
+            store(reach, reach_[side] + lane);
             most = max(most, reach);
         }
         return hn::MaxOfLanes(FloatTag(), most);
     }
-    void leave_out(const Patch& patch, Float others, const float (&reach)[kPatchTriangles], uint32_t& left) const {
-        for (size_t lane = 0; lane < patch.padded(); lane += kFloatLanes)
-            left &= ~(bits(others + load(reach + lane) <= room_) << lane);
+    void leave_out(size_t side, Float others) {
+        for (size_t lane = 0; lane < patch_[side]->padded(); lane += kFloatLanes)
+            left_[side] &= ~(bits(others + load(reach_[side] + lane) <= room_) << lane);
     }
 
     void decide_rest() {
         waiting_ = 0;
-        for (uint32_t done = 0; (left_a_ & ~done) != 0;) { // less is left as nearer ones are found
-            const auto i = static_cast<uint32_t>(std::countr_zero(left_a_ & ~done));
-            done |= (2u << i) - 1;
-            for (uint32_t near = near_to(i); near != 0; near &= near - 1) {
-                if (turn_ != 0 && reach_a_[i] + reach_b_[std::countr_zero(near)] <= nearly_ &&
-                    apart_along_normal(i, static_cast<uint32_t>(std::countr_zero(near))))
-                    continue;
-                pair_[waiting_][0] = i, pair_[waiting_][1] = static_cast<uint32_t>(std::countr_zero(near));
+        const size_t one = std::popcount(left_[1]) < std::popcount(left_[0]) ? 1 : 0, other = 1 - one;
+        for (uint32_t done = 0; (left_[one] & ~done) != 0;) { // less is left as nearer ones are found
+            uint32_t pair[2];
+            pair[one] = static_cast<uint32_t>(std::countr_zero(left_[one] & ~done));
+            done |= (2u << pair[one]) - 1;
+            for (uint32_t near = near_to(one, pair[one]); near != 0; near &= near - 1) {
+                pair[other] = static_cast<uint32_t>(std::countr_zero(near));
+                if (apart_along_normal(pair)) continue;
+                std::copy_n(pair, 2, pair_[waiting_]);
                 if (++waiting_ == kLanes) decide_waiting();
                 if (s_.overlapping) return;
             }
         }
         if (waiting_ > 0) decide_waiting();
     }
-    // Which of B's triangles may matter to A's, a bit each.
-    uint32_t near_to(uint32_t i) {
-        uint32_t near = left_b_;
+    // Which triangles of the other patch may matter to the i-th of this side's, a bit each.
+    uint32_t near_to(size_t side, uint32_t i) {
+        const size_t other = 1 - side, end = patch_[other]->padded();
+        uint32_t near = left_[other];
         if (turn_ != 0)
-            for (size_t lane = 0; lane < b_->padded(); lane += kFloatLanes)
-                near &= ~(bits(load(reach_b_ + lane) + reach_a_[i] <= room_) << lane);
-        for (size_t lane = 0; lane < b_->padded(); lane += kFloatLanes)
-            if ((near >> lane & kAllLanes) != 0) near &= ~(far_from(i, lane) << lane);
-        if (near != left_b_) note_skipped();
+            for (size_t lane = 0; lane < end; lane += kFloatLanes)
+                near &= ~(bits(load(reach_[other] + lane) + reach_[side][i] <= room_) << lane);
+        for (size_t lane = 0; lane < end; lane += kFloatLanes)
+            if ((near >> lane & kAllLanes) != 0)
+                near &= ~(far_from(*patch_[side], i, set(way_[side]), *patch_[other], lane) << lane);
+        if (near != left_[other]) note_skipped();
         return near;
     }
-    // Which of B's triangles from `lane` on are far enough by their own directions?
-    HWY_INLINE uint32_t far_from(uint32_t i, size_t lane) const {
-        const Float3 way = set(way_), n = Patch::broadcast3(a_->normal, i), m = load(b_->normal, lane);
+    // Which triangles of y from `lane` on are far enough from the i-th of x by their own directions? y's origin is
+    // `way` from x's.
+    HWY_INLINE uint32_t far_from(const Patch& x, uint32_t i, const Float3& way, const Patch& y, size_t lane) const {
+        const Float3 n = Patch::broadcast3(x.normal, i), m = load(y.normal, lane);
         const Float way_n = dot(n, way), way_m = dot(m, way);
-        const auto corner_a = [&](size_t k) { return dot(m, Patch::broadcast3(a_->corner[k], i)); };
-        const auto corner_b = [&](size_t k) { return dot(n, load(b_->corner[k], lane)); };
-        const Float a[3] = {corner_a(0), corner_a(1), corner_a(2)}, b[3] = {corner_b(0), corner_b(1), corner_b(2)};
+        const auto corner_x = [&](size_t k) { return dot(m, Patch::broadcast3(x.corner[k], i)); };
+        const auto corner_y = [&](size_t k) { return dot(n, load(y.corner[k], lane)); };
+        const Float a[3] = {corner_x(0), corner_x(1), corner_x(2)}, b[3] = {corner_y(0), corner_y(1), corner_y(2)};
         const Float along_n =
-            max(min(b[0], b[1], b[2]) + (way_n - set(a_->high[i])), (set(a_->low[i]) - way_n) - max(b[0], b[1], b[2]));
-        const Float along_m = max((load(b_->low + lane) + way_m) - max(a[0], a[1], a[2]),
-                                  min(a[0], a[1], a[2]) - (load(b_->high + lane) + way_m));
-        const Float3 between = load(b_->center, lane) + (way - Patch::broadcast3(a_->center, i));
-        const Float spheres = sqrt(dot(between, between)) - (load(b_->size + lane) + a_->size[i]);
+            max(min(b[0], b[1], b[2]) + (way_n - set(x.high[i])), (set(x.low[i]) - way_n) - max(b[0], b[1], b[2]));
+        const Float along_m = max((load(y.low + lane) + way_m) - max(a[0], a[1], a[2]),
+                                  min(a[0], a[1], a[2]) - (load(y.high + lane) + way_m));
+        const Float3 between = load(y.center, lane) + (way - Patch::broadcast3(x.center, i));
+        const Float spheres = sqrt(dot(between, between)) - (load(y.size + lane) + x.size[i]);
         return bits(max(along_n, along_m, spheres) - margin_ >= limit_in_lanes_);
     }
     // The last word on the normal, in double precision: where faces are flat and parallel, much is equally near.
-    bool apart_along_normal(uint32_t i, uint32_t j) {
-        double &a = exact_a_[i], &b = exact_b_[j];
-        if (a == kUnknown) a = triangle_support(s_.a.tree, {a_->range.first + i, 1}, s_.normal);
-        if (b == kUnknown) b = triangle_support(s_.b.tree, {b_->range.first + j, 1}, -s_.normal_b);
+    HWY_INLINE bool apart_along_normal(const uint32_t (&pair)[2]) {
+        return turn_ != 0 && reach_[0][pair[0]] + reach_[1][pair[1]] <= nearly_ && exactly_apart_along_normal(pair);
+    }
+    bool exactly_apart_along_normal(const uint32_t (&pair)[2]) {
+        double &a = exact_reach_[0][pair[0]], &b = exact_reach_[1][pair[1]];
+        if (a == kUnknown) a = triangle_support(s_.a.tree, {patch_[0]->range.first + pair[0], 1}, s_.normal);
+        if (b == kUnknown) b = triangle_support(s_.b.tree, {patch_[1]->range.first + pair[1], 1}, -s_.normal_b);
         const double along = glm::dot(s_.normal, s_.b_to_a.translation);
         const double gap = ((along - b) - a) - kSeparationMargin * s_.reach_of_triangles();
         if (!(gap * (1 - 0x1p-50) >= limit_)) return false;
@@ -325,8 +336,8 @@ private:
         for (uint32_t w = 0; w < waiting_; ++w)
             for (size_t c = 0; c < 3; ++c)
                 for (size_t k = 0; k < 3; ++k) {
-                    rows[0].row[3 * c + k][w] = a_->corner[c][k][pair_[w][0]];
-                    rows[1].row[3 * c + k][w] = b_->corner[c][k][pair_[w][1]] + way_[k];
+                    rows[0].row[3 * c + k][w] = patch_[0]->corner[c][k][pair_[w][0]];
+                    rows[1].row[3 * c + k][w] = patch_[1]->corner[c][k][pair_[w][1]] + way_[0][k];
                 }
         const LaneMargins margins{.direction =
                                       rounded_up(double{LaneMarginFactors().direction * lengths_} + kSeparationMargin),
@@ -343,7 +354,7 @@ private:
         if (turn_ != s_.normals_found) look_along_normal();
     }
     MeetingPair pair_at(uint32_t in_a, uint32_t in_b) const {
-        const uint32_t a = a_->range.first + in_a, b = b_->range.first + in_b;
+        const uint32_t a = patch_[0]->range.first + in_a, b = patch_[1]->range.first + in_b;
         return {leaf_with(s_.a, entry_->node_a, a), leaf_with(s_.b, entry_->node_b, b), a, b};
     }
     static uint32_t leaf_with(const TreeSide& side, uint32_t node, uint32_t triangle) {
@@ -362,18 +373,18 @@ private:
     const double unit_;
     Patch placed_[2][kPlaced];
     // The pair of patches:
-    const Patch *a_ = nullptr, *b_ = nullptr;
+    const Patch* patch_[2] = {};
     const Scratch::Entry* entry_ = nullptr;
     double bound_ = 0, limit_ = 0; // metres
     float limit_in_lanes_ = 0;
-    glm::dvec3 between_{0}; // from A's origin to B's, units,
-    float way_[3] = {};     // and rounded
+    glm::dvec3 between_{0}; // from A's origin to B's, units
+    float way_[2][3] = {};  // rounded, and back
     float margin_ = 0;
-    float lengths_ = 0;                // r1 + r2 + |d|
-    uint32_t left_a_ = 0, left_b_ = 0; // triangles, a bit each
-    uint32_t turn_ = 0;                // along which normal these reach; 0: none
-    alignas(32) float reach_a_[kPatchTriangles], reach_b_[kPatchTriangles];
-    double exact_a_[kPatchTriangles], exact_b_[kPatchTriangles]; // the same, metres from the bodies' origins, if known
+    float lengths_ = 0;     // r1 + r2 + |d|
+    uint32_t left_[2] = {}; // triangles, a bit each
+    uint32_t turn_ = 0;     // along which normal these reach; 0: none
+    alignas(32) float reach_[2][kPatchTriangles];
+    double exact_reach_[2][kPatchTriangles]; // the same, metres from the bodies' origins, if known
     float room_ = 0, nearly_ = 0; // two that reach no farther than this in all are far enough from each other
     uint32_t waiting_ = 0, pair_[kLanes][2];
 };
