@@ -1,6 +1,5 @@
 #include "query/world/bounds.hpp"
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -46,12 +45,13 @@ Anchor anchor(const LocalBounds& local, const RelativePose& to_world) noexcept {
 }
 
 double motion(const LocalBounds& local, const Anchor& from, const Anchor& to, double rounding) noexcept {
-    const dvec3 d = glm::abs(to.center - from.center);
+    const dvec3 d = to.center - from.center;
     const glm::dmat3 turn = to.rotation - from.rotation;
     const double turned =
         std::sqrt(glm::dot(turn[0], turn[0]) + glm::dot(turn[1], turn[1]) + glm::dot(turn[2], turn[2]));
     // A sum instead of a maximum would be a NaN if a part of it is; so is this one, by the last term.
-    return std::max({d.x, d.y, d.z}) + turned * local.radius + rounding * (from.reach + to.reach);
+    return std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) + turned * local.radius +
+           rounding * (from.reach + to.reach);
 }
 
 } // namespace prolate::query

@@ -255,7 +255,10 @@ Bounds bounds_of(const Probe& probe, float margin) noexcept {
         } else {
             const RoundedBox shape = place(p, Pose{}, margin);
             dvec3 half(shape.radius + kSeparationMargin * shape.reach);
-            for (glm::length_t i = 0; i < 3; ++i) half += glm::abs(shape.axes[i] * shape.half[i]);
+            for (glm::length_t i = 0; i < 3; ++i) { // glm::abs() branches
+                const dvec3 edge = shape.axes[i] * shape.half[i];
+                half += dvec3(std::abs(edge.x), std::abs(edge.y), std::abs(edge.z));
+            }
             const dvec3 low = shape.center - half, high = shape.center + half;
             return Bounds{{round_down(low.x), round_down(low.y), round_down(low.z)},
                           {round_up(high.x), round_up(high.y), round_up(high.z)}};
