@@ -30,6 +30,8 @@ constexpr double kShapeScale = 0.35;
 constexpr double kThinShapeScale = 0.1;
 constexpr double kPointsPerEllipsoid = 250, kLeastPoints = 15000; // of the surface, for descents
 constexpr double kPull = 20, kPullIterations = 500; // of longer descents of many, uncovered points pull less
+// Of a descent. Of many ellipsoids, or balls, the others hide most of the border, and what is seen of it has to do.
+constexpr int kDirectionsOfMany = 256;
 constexpr int kPolishDirections = 256;
 // A set whose ellipsoids start below those of the set above may have so much more error than one that starts alone.
 constexpr double kMostLoss = 1.15;
@@ -347,11 +349,11 @@ Objective FlatSetMaker::objective(size_t count) const {
 }
 
 DescentOptions FlatSetMaker::descent_options(size_t count, int iterations, double kappa, int number) const {
-    const double directions = 800 / std::sqrt(static_cast<double>(count));
+    const double directions = std::clamp(800 / std::sqrt(static_cast<double>(count)), 96.0, 384.0);
     return {.objective = objective(count),
             .primitive = options_.primitive,
             .iterations = iterations,
-            .directions = static_cast<int>(std::clamp(directions, 96.0, 384.0)),
+            .directions = count > kMergeLimit ? kDirectionsOfMany : static_cast<int>(directions),
             .min_radius = min_radius_,
             .relocate = count > kFew,
             .first_kappa = kappa,

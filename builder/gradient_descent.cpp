@@ -51,6 +51,15 @@ struct Pulling {
     Eigen::Vector3f s, y; // y: the point in the coordinates that make its owner the unit ball
 };
 
+// Eigenvector of the largest eigenvalue of the symmetric `q`, as long as that one's root.
+Vec longest_axis(const Mat& q) {
+    Matrix3 m;
+    for (size_t i = 0; i < 3; ++i)
+        for (size_t j = 0; j < 3; ++j) m[i][j] = q(int(i), int(j));
+    const Eigen3x3 axes = eigen_symmetric(m);
+    return std::sqrt(axes.values[0]) * Vec(axes.vectors[0][0], axes.vectors[1][0], axes.vectors[2][0]);
+}
+
 class GradientDescent {
 public:
     GradientDescent(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
@@ -225,17 +234,47 @@ private:
 
     // Ellipsoid `b` becomes one half of itself, `a` the other.
     void halve(uint32_t b, uint32_t a) {
-        const Fit whole = fits_[b];
-        const Mat q = whole.factor * whole.factor.transpose();
-        Matrix3 m;
-        for (size_t i = 0; i < 3; ++i)
-            for (size_t j = 0; j < 3; ++j) m[i][j] = q(int(i), int(j));
-        const Eigen3x3 axes = eigen_symmetric(m);
-        const Vec longest = std::sqrt(axes.values[0]) * Vec(axes.vectors[0][0], axes.vectors[1][0], axes.vectors[2][0]);
-        const Mat half = q - 0.65 * longest * longest.transpose();
-        fits_[b] = as_primitive(capped(whole.center - 0.45 * longest, half, options_.min_radius), options_.primitive);
-        fits_[a] = as_primitive(capped(whole.center + 0.45 * longest, half, options_.min_radius), options_.primitive);
+        if (options_.primitive != Primitive::sphere || !halve_ball(b, a)) {
+            const Fit whole = fits_[b];
+            const Mat q = whole.factor * whole.factor.transpose();
+            const Vec longest = longest_axis(q);
+            const Mat half = q - 0.65 * longest * longest.transpose();
+            for (const auto& [i, side] : {std::pair{b, -0.45}, {a, 0.45}})
+                fits_[i] =
+                    as_primitive(capped(whole.center + side * longest, half, options_.min_radius), options_.primitive);
+        }
         momentum_[a] = momentum_[b] = {};
+    }
+
+    // The same of a ball, which has no longest axis: what has one is the part of the surface that it alone holds, maybe
+    // a small cap. Each half moves as the middle of its side of that part does, and just holds it. False if there are
+    // too few points to tell.
+    bool halve_ball(uint32_t b, uint32_t a) {
+        constexpr size_t kLeast = 8;
+        const Fit whole = fits_[b];
+        std::vector<Vec> alone;
+        Vec middle = Vec::Zero();
+        for (const Vec& p : points_) {
+            if (whole.radial_squared(p) >= 1) continue;
+            const auto holds = [&](uint32_t i) { return fits_[i].radial_squared(p) < 1; };
+            if (std::ranges::none_of(neighbours_[b], holds)) alone.push_back(p), middle += p;
+        }
+        if (alone.size() < kLeast) return false;
+        middle /= static_cast<double>(alone.size());
+        Mat spread = Mat::Zero();
+        for (const Vec& p : alone) spread += (p - middle) * (p - middle).transpose();
+        const Vec axis = longest_axis(spread);
+        const auto border = std::ranges::partition(alone, [&](const Vec& p) { return axis.dot(p - middle) < 0; });
+        const auto low = static_cast<size_t>(border.begin() - alone.begin());
+        const std::span<const Vec> all(alone);
+        for (const auto& [i, side] : {std::pair{b, all.first(low)}, {a, all.subspan(low)}}) {
+            Vec by = Vec::Zero();
+            for (const Vec& p : side) by += (p - middle) / static_cast<double>(side.size());
+            double radius = options_.min_radius;
+            for (const Vec& p : side) radius = std::max(radius, (p - whole.center - by).norm());
+            fits_[i] = {whole.center + by, radius * Mat::Identity()};
+        }
+        return true;
     }
 
     // For each ellipsoid, the nodes of the field that it alone covers, inside and outside the solid.

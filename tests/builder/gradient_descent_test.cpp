@@ -249,6 +249,23 @@ TEST(Descent, LetsIdleEllipsoidsHelpElsewhere) {
     EXPECT_GT(outside[0], 0.2); // without, it stays between the two
 }
 
+TEST(Descent, LetsIdleBallsHelpElsewhere) {
+    const Mesh mesh = shapes::torus(1, 0.3f, 48, 24);
+    std::vector<Fit> start = around_a_torus(12);
+    for (int i = 0; i < 12; ++i) start.push_back(ball(start[static_cast<size_t>(i)].center, 0.05));
+    double outside[2];
+    for (const bool relocate : {false, true}) {
+        std::vector<Fit> set = start;
+        DescentOptions options = options_for(300, Primitive::sphere);
+        options.relocate = relocate;
+        descend_onto(mesh, set, options);
+        const CoverVolume volume = measure(mesh, set);
+        outside[relocate] = volume.outside.value / volume.solid.value;
+        EXPECT_LT(uncovered(volume), 0.02 * volume.solid.value);
+    }
+    EXPECT_LT(outside[1], 0.7 * outside[0]);
+}
+
 TEST(Descent, SpheresStaySpheres) {
     std::vector<Fit> set = around_a_torus(12);
     DescentOptions options = options_for(60, Primitive::sphere);
