@@ -49,11 +49,11 @@ void BorderSamples::hide(const Fit& fit, const Fit& other, std::span<uint32_t> h
     }
 }
 
-bool may_hide(const Fit& fit, const Fit& other) {
+bool apart(const Fit& fit, const Fit& other, double margin) {
     const Vec y = fit.radial(other.center);
     const double far = y.norm();
     const Vec normal = fit.inverse.transpose() * y;
-    return far * far - (other.factor.transpose() * normal).norm() - far < 1e-9;
+    return far * far > margin * (far + (other.factor.transpose() * normal).norm());
 }
 
 } // namespace prolate

@@ -35,8 +35,8 @@ private:
     std::vector<float> x_, y_, z_; // of turned_
 };
 
-/// May `other` hold a point of the border of `fit`? Not if it is beyond a plane between: that across the line of
-/// centers, in the coordinates that make `fit` the unit ball.
-bool may_hide(const Fit& fit, const Fit& other);
+/// Is there a plane between the two, were they `margin` times as large, across the line of their centers in the
+/// coordinates that make `fit` the unit ball? Then they are apart.
+bool apart(const Fit& fit, const Fit& other, double margin);
 
 } // namespace prolate

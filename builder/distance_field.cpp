@@ -9,6 +9,11 @@
 #include <cmath>
 
 namespace prolate {
+namespace {
+
+constexpr double kUnitsPerPitch = 256; // so distances of up to 128 steps are told apart
+
+} // namespace
 
 DistanceField::DistanceField(MeshView mesh, bool closed, const Winding& winding, uint32_t resolution) {
     Box box;
@@ -26,6 +31,7 @@ DistanceField::DistanceField(MeshView mesh, bool closed, const Winding& winding,
     propagate();
     closest_ = {};
     sign(mesh, closed, winding);
+    gather_corners();
 }
 
 // Exact distances around each triangle, one step beyond its box: slabs of the lattice in parallel.
@@ -95,6 +101,22 @@ void DistanceField::sign(MeshView mesh, bool closed, const Winding& winding) {
                      ++k)
                     distance_[index(i, j, k)] = -std::abs(distance_[index(i, j, k)]);
             }
+}
+
+void DistanceField::gather_corners() {
+    unit_ = pitch_ / kUnitsPerPitch;
+    const auto units = [this](int i, int j, int k) {
+        const size_t v = index(std::min(i, size_[0] - 1), std::min(j, size_[1] - 1), k);
+        const double rounded = std::floor(double{distance_[v]} * per_pitch_ * kUnitsPerPitch + 0.5);
+        return static_cast<int16_t>(std::clamp<double>(rounded, INT16_MIN, INT16_MAX));
+    };
+    corners_.resize(distance_.size());
+    parallel_for(0, size_[0], [&](int i) {
+        for (int j = 0; j < size_[1]; ++j)
+            for (int k = 0; k < size_[2]; ++k)
+                corners_[index(i, j, k)] = {units(i, j, k), units(i, j + 1, k), units(i + 1, j, k),
+                                            units(i + 1, j + 1, k)};
+    });
 }
 
 } // namespace prolate

@@ -32,12 +32,11 @@ public:
             beyond += (q[a] - inside) * (q[a] - inside);
             at[a] = static_cast<int>(inside), part[a] = inside - at[a];
         }
-        const float* const d = &distance_[index(at[0], at[1], at[2])];
-        const size_t y = static_cast<size_t>(size_[2]), x = y * static_cast<size_t>(size_[1]);
+        const Corners &low = corners_[index(at[0], at[1], at[2])], &high = *(&low + 1);
         const auto mix = [](double a, double b, double t) { return a + t * (b - a); };
-        const double near = mix(mix(d[0], d[1], part[2]), mix(d[y], d[y + 1], part[2]), part[1]);
-        const double far = mix(mix(d[x], d[x + 1], part[2]), mix(d[x + y], d[x + y + 1], part[2]), part[1]);
-        const double value = mix(near, far, part[0]);
+        double d[4];
+        for (size_t c = 0; c < 4; ++c) d[c] = mix(low[c], high[c], part[2]);
+        const double value = mix(mix(d[0], d[1], part[1]), mix(d[2], d[3], part[1]), part[0]) * unit_;
         return beyond > 0 ? value + std::sqrt(beyond) * pitch_ : value;
     }
 
@@ -57,11 +56,16 @@ private:
     void seed(MeshView mesh);
     void propagate();
     void sign(MeshView mesh, bool closed, const Winding& winding);
+    void gather_corners();
 
     Vec origin_;
-    double pitch_ = 0, per_pitch_ = 0;
+    double pitch_ = 0, per_pitch_ = 0, unit_ = 0;
     std::array<int, 3> size_{};
     std::vector<float> distance_;
+    // Distances at (i, j, k), (i, j + 1, k), (i + 1, j, k), (i + 1, j + 1, k), in units: with the next ones, all
+    // corners of a cell in 16 bytes. Points come in no order, and time goes into cache lines.
+    using Corners = std::array<int16_t, 4>;
+    std::vector<Corners> corners_;
     std::vector<Eigen::Vector3f> closest_; // of each node; emptied after the construction
 };
 

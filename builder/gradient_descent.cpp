@@ -80,7 +80,7 @@ public:
                 iteration % std::max(1, options_.iterations / kRelocations) == 0)
                 look = relocate() || look;
             if (look) {
-                neighbours_ = neighbours_of(fits_, kNeighbourMargin);
+                find_neighbours();
                 find_lost_points();
             }
             schedule(t);
@@ -109,14 +109,24 @@ private:
         step_ = kFirstStep * s * s * std::min(1.0, 10 / options_.first_kappa);
     }
 
+    // Until the next search, those that may come to touch. Boxes of slanted ellipsoids meet where these are far apart.
+    void find_neighbours() {
+        neighbours_ = neighbours_of(fits_, kNeighbourMargin);
+        parallel_for(size_t{0}, moving_, [&](size_t i) {
+            std::erase_if(neighbours_[i], [&](uint32_t other) {
+                return apart(fits_[i], fits_[other], kNeighbourMargin) ||
+                       apart(fits_[other], fits_[i], kNeighbourMargin);
+            });
+        });
+    }
+
     Fit step(size_t i) {
         Vec s = Vec::Zero();
         Mat g = Mat::Zero();
         const Fit& fit = fits_[i];
         const std::span<const Vec> directions = border_.directions();
         std::vector<uint32_t> hidden(directions.size(), 0);
-        for (const uint32_t other : neighbours_[i])
-            if (may_hide(fit, fits_[other])) border_.hide(fit, fits_[other], hidden);
+        for (const uint32_t other : neighbours_[i]) border_.hide(fit, fits_[other], hidden);
         for (size_t n = 0; n < directions.size(); ++n) {
             if (hidden[n]) continue;
             const Vec& u = directions[n];

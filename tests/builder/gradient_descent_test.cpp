@@ -54,6 +54,41 @@ std::vector<uint32_t> nearest_of(std::span<const Fit> fits, std::span<const Vec>
     return out;
 }
 
+Fit random_fit(Random& random) {
+    Mat shape = random_rotation(random);
+    for (int axis = 0; axis < 3; ++axis) shape.col(axis) *= 0.05 + random.uniform();
+    return {random_vec(random), cholesky(shape * shape.transpose())};
+}
+
+TEST(BorderSamples, AreHiddenByWhatHoldsThem) {
+    Random random(11);
+    BorderSamples samples(120);
+    int hidden_count = 0, apart_count = 0;
+    for (int round = 0; round < 500; ++round) {
+        const Fit fit = random_fit(random), other = random_fit(random);
+        samples.turn(random_rotation(random));
+        std::vector<uint32_t> hidden(samples.directions().size(), 0);
+        samples.hide(fit, other, hidden);
+        const bool between = apart(fit, other, 1);
+        apart_count += between;
+        for (size_t i = 0; i < hidden.size(); ++i) {
+            const double radial = other.radial(fit.center + fit.factor * samples.directions()[i]).norm();
+            if (std::abs(radial - 1) > 1e-4) {
+                EXPECT_EQ(hidden[i] == 1, radial < 1) << radial;
+            }
+            if (between) {
+                EXPECT_GE(radial, 1);
+            }
+            hidden_count += hidden[i] == 1;
+        }
+        std::vector<uint32_t> all(hidden.size(), 1);
+        samples.hide(fit, other, all);
+        EXPECT_TRUE(std::ranges::all_of(all, [](uint32_t h) { return h == 1; }));
+    }
+    EXPECT_GT(hidden_count, 2000);
+    EXPECT_GT(apart_count, 50);
+}
+
 DescentOptions options_for(int iterations, Primitive primitive = Primitive::ellipsoid) {
     return {.objective = {0.5, 0.5, 0.3},
             .primitive = primitive,
