@@ -27,6 +27,7 @@
 #include "query/raycast/triangle_lanes-inl.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -59,17 +60,10 @@ public:
         const int32_t step_exponent = side_->lattice.step_exponent;
         const Float limit = set(limit_);
         const size_t count = std::min<size_t>(siblings_, kBlockLanes);
-        top_->first = first_, top_->level = level_, waiting_lanes_ = 0;
+        uint32_t met = 0;
         const auto keep = [&](size_t i, Float enter, Float leave) {
-            Mask met = (enter <= leave) & hn::FirstN(FloatTag(), count - std::min(count, i));
-            if constexpr (kMeets == Meets::triangles) {
-                const Mask leaf = hn::RebindMask(FloatTag(), load_widened<int8_t>(block_ + kBlockCount + i) <
-                                                                 hn::Zero(hn::RebindToSigned<FloatTag>()));
-                leaves_ |= bits(met & leaf) << i;
-                met = hn::AndNot(leaf, met);
-            }
-            store_unaligned(choose(met, enter, set(kNever)), top_->bounds + i);
-            waiting_lanes_ |= bits(met) << i;
+            store_unaligned(enter, top_->bounds + i);
+            met |= bits(enter <= leave) << i;
         };
         [[maybe_unused]] BoxRay boxes;
         if constexpr (!kGrown) boxes = box_ray(block_, ray);
@@ -86,6 +80,13 @@ public:
                 keep(i, in.enter, in.leave);
             }
         }
+        met &= (1u << count) - 1;
+        if constexpr (kMeets == Meets::triangles) {
+            const uint32_t leaves = triangle_lanes(block_);
+            leaves_ = met & leaves, met &= ~leaves;
+        }
+        waiting_lanes_ = met;
+        top_->first = first_, top_->level = level_;
         siblings_ -= static_cast<uint32_t>(count);
     }
 
@@ -149,7 +150,7 @@ public:
             RayFamily& family = top_[-1];
             const uint32_t lane = nearest(family);
             const float bound = family.bounds[lane];
-            family.waiting &= ~(1u << lane), family.bounds[lane] = kNever;
+            family.waiting &= ~(1u << lane);
             if (bound > limit_) family.waiting = 0;
             if (family.waiting == 0) --top_;
             if (bound > limit_) continue;
@@ -170,6 +171,12 @@ private:
     static constexpr bool kGrown = kMeets == Meets::grown;
     static constexpr float kNever = std::numeric_limits<float>::infinity();
 
+    // Lanes that are leaves with triangles, as bits.
+    static uint32_t triangle_lanes(const std::byte* block) {
+        static_assert(kTriangleLeaf == 0x80);
+        const uint64_t leaves = load_le<uint64_t>(block + kBlockCount) & 0x8080808080808080;
+        return static_cast<uint32_t>((leaves >> 7) * 0x0102040810204080 >> 56); // gathers one bit of each byte
+    }
     HWY_INLINE Float ellipsoid_entries(const LaneNodes& nodes, Float limit) const {
         return lattice_ray_.thickness > 0 ? entry_lanes<true>(nodes, lattice_ray_, limit)
                                           : entry_lanes<false>(nodes, lattice_ray_, limit);
@@ -182,6 +189,11 @@ private:
         top_->waiting = waiting_lanes_;
         top_ += waiting_lanes_ != 0;
         waiting_lanes_ = 0;
+    }
+    // Infinite of those that do not wait.
+    HWY_INLINE static Float waiting_bounds(const RayFamily& family, size_t first) {
+        const std::array<uint8_t, 8> waiting{static_cast<uint8_t>(family.waiting >> first)};
+        return choose(hn::LoadMaskBits(FloatTag(), waiting.data()), load_unaligned(family.bounds + first), set(kNever));
     }
     // Of those that wait, some of which there are.
     HWY_INLINE static uint32_t nearest(const RayFamily& family) {
@@ -196,11 +208,11 @@ private:
         } else {
             Float bounds = set(kNever);
             for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
-                bounds = min(bounds, load_unaligned(family.bounds + i));
+                bounds = min(bounds, waiting_bounds(family, i));
             const Float least = hn::MinOfLanes(FloatTag(), bounds);
             uint32_t lanes = 0;
             for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
-                lanes |= bits(load_unaligned(family.bounds + i) == least) << i;
+                lanes |= bits(waiting_bounds(family, i) == least) << i;
             return static_cast<uint32_t>(std::bit_width(lanes)) - 1;
         }
     }
@@ -231,7 +243,8 @@ private:
     HWY_NOINLINE bool end(float bound) {
         push();
         for (; top_ != base_; --top_)
-            for (const float waits : top_[-1].bounds) bound = std::min(bound, waits);
+            for (uint32_t rest = top_[-1].waiting; rest != 0; rest &= rest - 1)
+                bound = std::min(bound, top_[-1].bounds[std::countr_zero(rest)]);
         s_->clear = double{bound} * s_->ray.length;
         return false;
     }

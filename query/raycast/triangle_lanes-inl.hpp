@@ -78,15 +78,15 @@ struct SeenCorners {
 HWY_INLINE void see(const RayTriangles& triangles, size_t at, const PlacedRay& ray, double scale, SeenCorners& out) {
     const FourTag d;
     const double origin[] = {ray.origin.x, ray.origin.y, ray.origin.z}; // glm's own [] branches
+    const RayShear& shear = ray.shear;
+    const auto relative = [&](size_t corner, size_t axis, double sign) { // times the sign, which costs no rounding
+        const auto stored = hn::Load(hn::Rebind<float, FourTag>(), triangles.rows[3 * corner + axis] + at);
+        return hn::PromoteTo(d, stored) * hn::Set(d, scale * sign) - hn::Set(d, origin[axis] * sign);
+    };
     for (size_t c = 0; c < 3; ++c) {
-        const auto relative = [&](size_t axis) {
-            const auto stored = hn::Load(hn::Rebind<float, FourTag>(), triangles.rows[3 * c + axis] + at);
-            return hn::PromoteTo(d, stored) * hn::Set(d, scale) - hn::Set(d, origin[axis]);
-        };
-        const Four depth = relative(ray.shear.k);
-        out.x[c] = relative(ray.shear.i) - hn::Set(d, ray.shear.shear[0]) * depth;
-        out.y[c] = relative(ray.shear.j) - hn::Set(d, ray.shear.shear[1]) * depth;
-        out.z[c] = hn::Set(d, ray.shear.sign) * depth;
+        out.z[c] = relative(c, shear.k, shear.sign);
+        out.x[c] = relative(c, shear.i, 1) - hn::Set(d, shear.shear[0] * shear.sign) * out.z[c];
+        out.y[c] = relative(c, shear.j, 1) - hn::Set(d, shear.shear[1] * shear.sign) * out.z[c];
     }
 }
 
@@ -112,29 +112,28 @@ HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, cons
         const auto least = [](const Four(&v)[3]) { return hn::Min(hn::Min(v[0], v[1]), v[2]); };
         const auto most = [](const Four(&v)[3]) { return hn::Max(hn::Max(v[0], v[1]), v[2]); };
         const Four low = least(z), high = most(z);
-        const Four beside = hn::Max(hn::Max(least(x), least(y)), hn::Neg(hn::Min(most(x), most(y))));
-        auto missed = hn::Or(beside > tau, hn::Or(hn::Neg(high) > tau, low > end + tau));
+        const Four left = least(x), right = most(x), bottom = least(y), top = most(y);
+        const Four beside = hn::Max(hn::Max(left, bottom), hn::Neg(hn::Min(right, top)));
+        // No corner is farther from the axis, in either coordinate.
+        const Four widest = hn::Max(hn::Max(right, top), hn::Neg(hn::Min(left, bottom)));
         Four weight[3];
-        auto positive = zero > zero, negative = positive, doubted = positive;
-        for (size_t c = 0; c < 3; ++c) {
-            const size_t a = (c + 1) % 3, b = (c + 2) % 3;
-            weight[c] = x[a] * y[b] - y[a] * x[b];
-            const Four bound = tau * ((hn::Abs(x[a]) + hn::Abs(y[a])) + (hn::Abs(x[b]) + hn::Abs(y[b])));
-            const auto above = weight[c] > bound, below = hn::Neg(weight[c]) > bound;
-            positive = hn::Or(positive, above), negative = hn::Or(negative, below);
-            doubted = hn::Or(doubted, hn::Not(hn::Or(above, below)));
-        }
-        const auto met = hn::Not(hn::Or(missed, hn::And(positive, negative)));
+        for (size_t c = 0; c < 3; ++c) weight[c] = x[(c + 1) % 3] * y[(c + 2) % 3] - y[(c + 1) % 3] * x[(c + 2) % 3];
+        const Four bound = set(4) * tau * widest; // no less than that of each edge
+        const Four least_weight = least(weight), most_weight = most(weight);
+        const auto some_above = most_weight > bound, some_below = hn::Neg(least_weight) > bound;
+        const auto missed = hn::Or(hn::Or(beside > tau, hn::And(some_above, some_below)),
+                                   hn::Or(hn::Neg(high) > tau, low > end + tau));
+        const auto one_sided = hn::Or(least_weight > bound, hn::Neg(most_weight) > bound);
         // All weights have the same sign for certain; it cancels.
         const Four mean =
                        (weight[0] * z[0] + weight[1] * z[1] + weight[2] * z[2]) / (weight[0] + weight[1] + weight[2]),
                    depth = hn::Min(hn::Max(mean, low), high);
-        const auto certain = hn::And(met, hn::AndNot(doubted, hn::And(depth >= zero, depth <= end)));
+        const auto certain = hn::AndNot(missed, hn::And(one_sided, hn::And(depth >= zero, depth <= end)));
         const Four t = hn::Min(depth / set(ray.shear.per_t), set(ray.length));
         const Four hit = hn::IfThenElse(certain, t, never);
         hn::Store(hit, d, hit_at + at);
         first_hit = hn::Min(first_hit, hit);
-        out.open |= bits(d, hn::AndNot(certain, met)) << at;
+        out.open |= bits(d, hn::Not(hn::Or(certain, missed))) << at;
     }
     first_hit = hn::MinOfLanes(d, first_hit);
     uint32_t first = 0;
