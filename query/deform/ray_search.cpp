@@ -9,7 +9,8 @@ PlacedRay place(const Ray& ray, const RelativePose& to_frame, const Deformed& bo
     const Bound root = body.bound(0);
     // What the deformation adds to the rounding that ray.hpp accounts for.
     const double slack = kSeparationMargin * (root.core.reach + to_frame.distance);
-    return place(ray, to_frame, root.core, margin + root.radius + slack);
+    return place(ray, to_frame.rotation, to_frame.translation, to_frame.distance,
+                 {root.core.center, root.core.size, root.core.reach}, margin + root.radius + slack);
 }
 
 // Is the node met, and from which parameter on, before the best hit?

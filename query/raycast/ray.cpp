@@ -168,17 +168,22 @@ RayShear shear_to_axis(const dvec3& d) {
 
 } // namespace
 
-PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllipsoid& bound, double distance) noexcept {
-    return place(ray, to_frame.rotation, to_frame.translation, to_frame.distance, bound, distance);
+RayBound ray_bound(const TreeView& tree) noexcept {
+    const detail::RootVolume& root = tree.raw().root();
+    const auto scale = double{tree.scale()};
+    constexpr double kRoundUp = 1 + 0x1p-48; // as the reach of the farthest corner may be
+    return {.center = {root.center[0] * scale, root.center[1] * scale, root.center[2] * scale},
+            .radius = root.radius * scale,
+            .reach = root.reach * scale * kRoundUp};
 }
 
-PlacedRay place(const Ray& ray, const dmat3& rotation, const dvec3& origin, double far, const PlacedEllipsoid& bound,
+PlacedRay place(const Ray& ray, const dmat3& rotation, const dvec3& origin, double far, const RayBound& bound,
                 double distance) noexcept {
     const dvec3 direction = rotation * to_double(ray.direction);
-    const double speed = glm::length(direction);
-    // Whatever is met lies in the ball around the bound, or near it, so |t - middle| speed is at most its radius.
-    const double reach = far + bound.reach + distance, radius = bound.size + distance + kSeparationMargin * reach;
-    const double middle = glm::dot(bound.center - origin, direction) / (speed * speed), half = radius / speed;
+    const double square = glm::dot(direction, direction), speed = std::sqrt(square);
+    // Whatever is met lies in the ball, or near it, so |t - middle| speed is at most its radius.
+    const double reach = far + bound.reach + distance, radius = bound.radius + distance + kSeparationMargin * reach;
+    const double middle = glm::dot(bound.center - origin, direction) / square, half = radius / speed;
     const double begin = std::max(0.0, middle - half), end = std::min(double{ray.max_t}, middle + half);
     PlacedRay out{};
 

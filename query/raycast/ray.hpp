@@ -4,7 +4,8 @@
 // The ray is cut down to the part near the root first, and counted from there (PlacedRay), so that a far origin costs
 // no more than the rounding of its own distance. u = 2^-53, S = all lengths that enter: in the terms of
 // query/ellipsoid/separation.hpp the points of the placed ray are wrong by less than 75 u S (origin) and 34 u S
-// (direction).
+// (direction). What cuts them down is right within 200 u S, the ball's radius included, and kSeparationMargin, 256 u S,
+// wider.
 //
 // Ellipsoid: as in lanes-inl.hpp, (1). n.r, |L^T n| and t n.d add up to 15 u |n| S of rounding, with the ray's own
 // 124 u |n| S: kSeparationMargin, 256 u, is demanded. Not certainly missed is hit.
@@ -57,17 +58,23 @@ struct PlacedRay {
     double begin, length;
     double reach; ///< its share of S
     RayShear shear;
-    bool empty; ///< certainly misses the ellipsoid that it was cut down to
+    bool empty; ///< certainly misses the ball that it was cut down to
     bool valid; ///< all is finite, and the direction not 0
 };
-/// `to_frame`: from a frame at the ray's origin that is turned as the world, to the tree's. Cuts the ray down to what
-/// may come as near to `bound` as `distance`.
-PlacedRay place(const Ray& ray, const RelativePose& to_frame, const PlacedEllipsoid& bound,
+/// A ball that holds all that a ray may meet, in the tree's frame.
+struct RayBound {
+    glm::dvec3 center;
+    double radius;
+    double reach; ///< no less than the moduli of center and radius, and of any point that is met: its share of S
+};
+
+/// Of a tree, whose leaf ellipsoids or triangles it holds.
+RayBound ray_bound(const TreeView& tree) noexcept;
+
+/// `rotation`: from the world's axes to the tree's frame, in which the ray begins at `origin`, `far` from the frame's
+/// own. Cuts the ray down to what may come as near to the ball as `distance`.
+PlacedRay place(const Ray& ray, const glm::dmat3& rotation, const glm::dvec3& origin, double far, const RayBound& bound,
                 double distance = 0) noexcept;
-/// The same, `to_frame` in its parts: `rotation`, and in the tree's frame the ray's `origin`, `far` from where it
-/// begins.
-PlacedRay place(const Ray& ray, const glm::dmat3& rotation, const glm::dvec3& origin, double far,
-                const PlacedEllipsoid& bound, double distance) noexcept;
 
 struct RayHit {
     double t;          ///< of the placed ray

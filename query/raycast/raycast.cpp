@@ -27,14 +27,14 @@ QueryOptions for_rays(const TreeView& tree, const QueryOptions& options) {
     return out;
 }
 
-PlacedEllipsoid root_of(const TreeView& tree, const float* growth) {
-    PlacedEllipsoid out = place(growth ? tree.root() : tree.root_bound(), tree.scale());
-    if (growth) out.size *= double{growth[0]}, out.reach *= double{growth[0]};
-    return out;
+RayBound root_of(const TreeView& tree, const float* growth) {
+    if (!growth) return ray_bound(tree);
+    const PlacedEllipsoid e = place(tree.root(), tree.scale());
+    return {e.center, e.size * double{growth[0]}, e.reach * double{growth[0]}};
 }
 
 PlacedRay place_ray(const RaycastBody& body, const Ray& ray) {
-    const glm::dvec3 from_body = to_double(ray.origin) - body.translation;
+    const dvec3 from_body = to_double(ray.origin) - body.translation;
     return place(ray, body.rotation, body.rotation * from_body, glm::length(from_body), body.root,
                  double{body.options.margin});
 }
@@ -75,9 +75,9 @@ void complete_hit(const query::RaycastSearch& search, const Ray& ray, RaycastRes
         normal = face_normal(body.side.tree, search.triangle);
     // Scaled first: the products of tiny or huge edges may lie beyond a double's squares.
     const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
-    normal = largest > 0 ? normal / largest * body.rotation : -direction;
+    normal = largest > 0 ? normal * (1 / largest) * body.rotation : -direction;
     out.point = to_float(to_double(ray.origin) + out.t * direction);
-    out.normal = to_float(normal / glm::length(normal));
+    out.normal = to_float(normal * (1 / glm::length(normal)));
 }
 
 void complete(const query::RaycastSearch& search, const Ray& ray, RaycastResult& out) {

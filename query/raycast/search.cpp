@@ -126,6 +126,7 @@ public:
         if (gathered_ == 0) return;
         const uint32_t node = nodes_[hits_.lane], triangle = triangles_.index[hits_.lane];
         const bool better = hits_.t < s_->best.t;
+        if (!better && hits_.open == 0) return; // guessed, so that what comes next need not wait for it
         s_->best.t = std::min(s_->best.t, hits_.t), s_->found = s_->found || better;
         s_->node = better ? node : s_->node, s_->triangle = better ? triangle : s_->triangle;
         for (uint32_t rest = hits_.open; rest != 0; rest &= rest - 1) {
@@ -207,8 +208,7 @@ private:
             return best;
         } else {
             Float bounds = set(kNever);
-            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
-                bounds = min(bounds, waiting_bounds(family, i));
+            for (size_t i = 0; i < kBlockLanes; i += kFloatLanes) bounds = min(bounds, waiting_bounds(family, i));
             const Float least = hn::MinOfLanes(FloatTag(), bounds);
             uint32_t lanes = 0;
             for (size_t i = 0; i < kBlockLanes; i += kFloatLanes)
@@ -322,10 +322,10 @@ template <Meets kMeets, size_t kMost> void traverse_rays(std::span<RaycastSearch
             at_leaves[some] = active[i], some += active[i]->at_leaves();
         }
         while (some > 0) {
-            for (uint32_t i = 0; i < some; ++i) at_leaves[i]->gather();
-            for (uint32_t i = 0; i < some; ++i) at_leaves[i]->test_triangles();
             uint32_t stay = 0;
             for (uint32_t i = 0; i < some; ++i) {
+                at_leaves[i]->gather();
+                at_leaves[i]->test_triangles();
                 at_leaves[i]->meet_triangles();
                 at_leaves[stay] = at_leaves[i], stay += at_leaves[i]->at_leaves();
             }

@@ -37,7 +37,7 @@ struct RaycastBody {
     const float* const growth;  ///< of raycast_cut(): by slots; else null
     RayFamily* const stacks;    ///< null if the scratch is too small
     const uint32_t stack_size;  ///< of each
-    const PlacedEllipsoid root;
+    const RayBound root;
     const glm::dvec3 translation;
     const glm::dmat3 rotation;             ///< from the world to the body
     const double per_step;                 ///< lattice steps a metre

@@ -1,6 +1,7 @@
 // Where does a thin ray hit four triangles? In double precision, by the scalar hit() (ray.cpp), operation by operation,
-// so their rounding is worked out there; only tau is that of the whole tree, which is no less than a triangle's. What
-// is certain with it hit() says as well, to the bit; what lies in doubt hit() decides. So these lanes change no answer.
+// so their rounding is worked out there; only tau is that of the whole tree, and one bound serves all edges, which are
+// no less than a triangle's and an edge's. What is certain with them hit() says as well, to the bit; what lies in doubt
+// hit() decides. So these lanes change no answer.
 // Compiled once for each instruction set; include it below <hwy/foreach_target.h>.
 //
 // Cost: about 60 loads and shuffles and 130 operations for four triangles. (One in plain code takes longer.)
@@ -103,7 +104,8 @@ HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, cons
                tau = set(kRayMargin * (ray.reach + reach)), end = set(farthest * ray.shear.per_t);
     alignas(32) double hit_at[RayTriangles::kLanes];
     Four first_hit = never;
-    FourHits out{};
+    FourHits out{.t = std::numeric_limits<double>::infinity(), .lane = 0, .open = 0};
+    bool some_certain = false; // perhaps
     for (size_t at = 0; at < RayTriangles::kLanes; at += hn::MaxLanes(d)) {
         SeenCorners seen;
         see(triangles, at, ray, double{tree.scale()}, seen);
@@ -121,8 +123,10 @@ HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, cons
         const Four bound = set(4) * tau * widest; // no less than that of each edge
         const Four least_weight = least(weight), most_weight = most(weight);
         const auto some_above = most_weight > bound, some_below = hn::Neg(least_weight) > bound;
-        const auto missed = hn::Or(hn::Or(beside > tau, hn::And(some_above, some_below)),
-                                   hn::Or(hn::Neg(high) > tau, low > end + tau));
+        const auto missed =
+            hn::Or(hn::Or(beside > tau, hn::And(some_above, some_below)), hn::Or(hn::Neg(high) > tau, low > end + tau));
+        hn::Store(never, d, hit_at + at);
+        if (hn::AllTrue(d, missed)) continue; // as every other time
         const auto one_sided = hn::Or(least_weight > bound, hn::Neg(most_weight) > bound);
         // All weights have the same sign for certain; it cancels.
         const Four mean =
@@ -133,8 +137,10 @@ HWY_INLINE FourHits hit_four(const TreeView& tree, RayTriangles& triangles, cons
         const Four hit = hn::IfThenElse(certain, t, never);
         hn::Store(hit, d, hit_at + at);
         first_hit = hn::Min(first_hit, hit);
+        some_certain = true;
         out.open |= bits(d, hn::Not(hn::Or(certain, missed))) << at;
     }
+    if (!some_certain) return out;
     first_hit = hn::MinOfLanes(d, first_hit);
     uint32_t first = 0;
     for (size_t at = 0; at < RayTriangles::kLanes; at += hn::MaxLanes(d))

@@ -371,8 +371,9 @@ TEST(Agreement, OfRaysAndShapes) {
             const Point o = random.direction(), to = random.in_ball();
             const Ray ray{scenes::to_float({3 * o[0], 3 * o[1], 3 * o[2]}),
                           scenes::to_float({1.4 * to[0] - 3 * o[0], 1.4 * to[1] - 3 * o[1], 1.4 * to[2] - 3 * o[2]})};
+            const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
             const query::PlacedRay placed =
-                query::place(ray, query::relative_pose(pose, {ray.origin, {}}), query::place(tree.bound(0)));
+                query::place(ray, to_frame.rotation, to_frame.translation, to_frame.distance, query::ray_bound(tree));
             double first = kInfinity;
             if (!placed.empty)
                 for (const Ellipsoid& e : leaves)

@@ -68,8 +68,12 @@ Real first(const TrueRay& ray, const reference::Corners& c) {
     return t;
 }
 
+query::PlacedRay place(const Ray& ray, const Pose& pose, const query::RayBound& bound, double distance = 0) {
+    const query::RelativePose to_frame = query::relative_pose(pose, {ray.origin, {}});
+    return query::place(ray, to_frame.rotation, to_frame.translation, to_frame.distance, bound, distance);
+}
 query::PlacedRay place(const Ray& ray, const Pose& pose, const query::PlacedEllipsoid& bound, double distance = 0) {
-    return query::place(ray, query::relative_pose(pose, {ray.origin, {}}), bound, distance);
+    return place(ray, pose, {bound.center, bound.size, bound.reach}, distance);
 }
 
 // ---- single leaves ----
@@ -466,7 +470,7 @@ struct Brute {
 };
 Brute brute_triangles(const TreeView& tree, const Pose& pose, const Ray& ray, double margin = 0) {
     Brute out;
-    const query::PlacedRay placed_ray = place(ray, pose, query::place(tree.ellipsoid(0)), margin);
+    const query::PlacedRay placed_ray = place(ray, pose, query::ray_bound(tree), margin);
     if (placed_ray.empty) return out;
     for (uint32_t t = 0; t < tree.triangle_count(); ++t) {
         const auto triangle = query::place(tree, t);
@@ -546,6 +550,21 @@ TEST(Raycast, ExactTreesAnswerAsAllTheirTrianglesDo) {
         EXPECT_LT(met, count * 9 / 10) << size;
         EXPECT_GT(budgets, 10) << size;
     }
+}
+
+// The ball that rays are cut down to has no room to spare at a cube's corners.
+TEST(Raycast, CornersOnTheBoundAreMet) {
+    const auto scene = scenes::exact_tree(shapes::moved(shapes::box(2, 2, 2), {-1, -1, -1}));
+    const auto tree = *TreeView::open(scene.bytes), larger = *tree.scaled(3);
+    for (const float x : {-1.0f, 1.0f})
+        for (const float y : {-1.0f, 1.0f})
+            for (const float z : {-1.0f, 1.0f}) {
+                const Ray inwards{{5 * x, 5 * y, 5 * z}, {-x, -y, -z}}, outwards{{x / 4, y / 4, z / 4}, {x, y, z}};
+                EXPECT_NEAR(cast(tree, {}, inwards).t, 4, 1e-12);
+                EXPECT_NEAR(cast(tree, {}, outwards).t, 0.75, 1e-12);
+                EXPECT_NEAR(cast(larger, {}, inwards).t, 2, 1e-12);
+                EXPECT_NEAR(cast(larger, {}, outwards).t, 2.75, 1e-12);
+            }
 }
 
 // With a scratch for many rays at once, and with one that suffices for one alone.
