@@ -167,6 +167,7 @@ private:
             node.packed.triangle_count = static_cast<uint8_t>(size);
             report(size);
         } else {
+            node.children.reserve(opening.lanes);
             add_siblings(node.children, BinaryTree::left_of(node.binary), opening.left_lanes);
             add_siblings(node.children, binary_.right_of(node.binary), uint32_t{opening.lanes} - opening.left_lanes);
             node.packed.child_count = static_cast<uint8_t>(node.children.size());
@@ -193,7 +194,6 @@ private:
 
     // The node's ellipsoid and box. Of many corners, the sketch is the core of a fit.
     void cover(Node& node, std::span<const Vec> corners, const Sketch& sketch) {
-        checkpoint();
         std::vector<Vec> core =
             sketch.empty() ? std::vector(corners.begin(), corners.end()) : without_repeats(sketch.points());
         const double tolerance = node.packed.child_count == 0 ? kLeafTolerance : options_.effort.tolerance;

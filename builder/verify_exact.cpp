@@ -108,6 +108,12 @@ private:
     std::vector<uint32_t> leaves_;
 };
 
+// What an inner node has beside its ellipsoid.
+struct Closer {
+    std::optional<Hull> hull; // none if it says nothing
+    std::optional<Slab> slab;
+};
+
 // For each node, a corner beneath it that it, its hull or its slab does not hold.
 std::vector<Doubt> find_doubts(const TreeView& tree) {
     const uint32_t slots = tree.slot_count();
@@ -116,8 +122,9 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
     std::vector<double> largest(slots); // squared radial coordinate within, beyond doubt
     std::vector<Fit> fits(slots);
     std::vector<Doubt> doubts(slots);
-    std::vector<std::optional<Hull>> hulls(slots);
-    std::vector<std::optional<Slab>> slabs(slots);
+    std::vector<uint32_t> closer_at(slots, UINT32_MAX);
+    std::vector<Closer> closer;
+    closer.reserve(tree.block_count()); // no two inner nodes share one
     tree.for_each_node([&](uint32_t n) {
         const ChildRange children = tree.children(n);
         for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
@@ -126,11 +133,12 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         largest[n] = 1 - kGrowthRounding * fits[n].factor.norm() * fits[n].inverse.norm();
         if (children.count == 0) return;
         const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
-        if (has_slab(record)) slabs[n] = slab_of(tree, record);
-        hulls[n].emplace(record);
-        if (hulls[n]->share == 0) hulls[n].reset(); // it says nothing
-        if (const Vec3 c = ellipsoids[n].center; hulls[n] && !in_hull(*hulls[n], Vec::Zero()))
-            doubts[n].set(c.x, c.y, c.z);
+        closer_at[n] = static_cast<uint32_t>(closer.size());
+        auto& [hull, slab] = closer.emplace_back();
+        if (has_slab(record)) slab = slab_of(tree, record);
+        hull.emplace(record);
+        if (hull->share == 0) hull.reset();
+        if (const Vec3 c = ellipsoids[n].center; hull && !in_hull(*hull, Vec::Zero())) doubts[n].set(c.x, c.y, c.z);
     });
     const LeavesOfVertices leaves(tree);
     std::vector<uint32_t> looked_at(slots, UINT32_MAX); // the vertex that a node has last been asked for
@@ -142,10 +150,13 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         for (const uint32_t leaf : leaves.of(v))
             for (uint32_t node = leaf; looked_at[node] != v; node = parent[node]) { // the root is its own parent
                 looked_at[node] = v;
-                if (!(radial_squared(ellipsoids[node], p) <= largest[node]) ||
-                    (hulls[node] && !in_hull(*hulls[node], fits[node].radial(to_vec(at)))) ||
-                    (slabs[node] && !in_slab(*slabs[node], to_vec(at))))
-                    doubts[node].set(p[0], p[1], p[2]);
+                bool held = radial_squared(ellipsoids[node], p) <= largest[node];
+                if (closer_at[node] != UINT32_MAX) {
+                    auto& [hull, slab] = closer[closer_at[node]];
+                    held = held && (!hull || in_hull(*hull, fits[node].radial(to_vec(at)))) &&
+                           (!slab || in_slab(*slab, to_vec(at)));
+                }
+                if (!held) doubts[node].set(p[0], p[1], p[2]);
             }
     }
     return doubts;
