@@ -99,8 +99,7 @@ private:
         const float reach = hull_reach(hull, v[0], v[1], v[2], width);
         const auto stated = load_le<uint8_t>(hull + kHullShare);
         const float share = stated > 0 ? static_cast<float>(stated) * kPerHullShare : 1;
-        return {node, turn_, metres(center + double{reach + kLaneMargin * size}),
-                double{share * width + 2 * kLaneMargin * size} * step_};
+        return {node, turn_, metres(center + double{reach + kLaneMargin * size}), double{share * width} * step_};
     }
 
     // Upper bounds of the lanes of a block, steps from the lattice's origin; NaN becomes infinite.
@@ -139,13 +138,13 @@ private:
                 most = here.most;
                 continue;
             }
+            if (++blocks > kMostBlocks) return HUGE_VAL;
             if (const TriangleRange range = patch_at(side_, e.node_a); range.count > 0) {
                 const double reach = triangle_support(side_.tree, range, n_);
                 if (reach > hopeless) return HUGE_VAL;
                 most = std::max(most, reach);
                 continue;
             }
-            if (++blocks > kMostBlocks) return HUGE_VAL;
             const ChildRange children = children_in(side_.block(e.node_a), e.node_a % kBlockLanes);
             for_each_block(children, [&](uint32_t first, uint32_t count) {
                 alignas(32) float bound[kBlockLanes];
