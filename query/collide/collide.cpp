@@ -20,11 +20,11 @@ double gap_of_flat_roots(const TreeView& a, const TreeView& b, const query::Rela
 }
 
 // What holds a tree's root, metres, as queries see it.
-struct Root {
+struct ScaledRoot {
     glm::dvec3 center, half; // of a box
     double radius, reach;    // of a ball about the same center; how far it reaches from the origin
 };
-Root root_of(const TreeView& tree) {
+ScaledRoot scaled_root(const TreeView& tree) {
     const detail::RootVolume& root = tree.raw().root();
     const auto& [center, radius, half, reach] = root;
     const double scale = tree.scale();
@@ -94,7 +94,7 @@ bool query::names_leaves(const MeetingPair& pair, const TreeView& a, const TreeV
 }
 
 double query::gap_of_spheres(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
-    const Root root_a = root_of(a), root_b = root_of(b);
+    const ScaledRoot root_a = scaled_root(a), root_b = scaled_root(b);
     const glm::dvec3 center_b = b_to_a.rotation * root_b.center + b_to_a.translation;
     return glm::distance(root_a.center, center_b) - root_a.radius - root_b.radius -
            kSeparationMargin * (root_a.reach + root_b.reach + b_to_a.distance);
@@ -108,7 +108,8 @@ constexpr double kEdgesMayTell = 0.2;
 
 // What the axes across a side of either box tell; `slack` pays for all rounding of what lies along an axis of at most
 // length 1, and the share of a length of 2^-10 or more is right to 2^-40 of itself.
-double gap_across_sides(const Root& a, const Root& b, const glm::dmat3& to_a, const glm::dvec3& between, double slack) {
+double gap_across_sides(const ScaledRoot& a, const ScaledRoot& b, const glm::dmat3& to_a, const glm::dvec3& between,
+                        double slack) {
     double gap = -HUGE_VAL;
     const auto look = [&](glm::length_t i, glm::length_t k) {
         const glm::length_t i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
@@ -129,7 +130,7 @@ double gap_across_sides(const Root& a, const Root& b, const glm::dmat3& to_a, co
 // The axes of S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree: a hierarchical structure for rapid interference
 // detection", SIGGRAPH 1996.
 double query::gap_of_boxes(const TreeView& a, const TreeView& b, const RelativePose& b_to_a) noexcept {
-    const Root root_a = root_of(a), root_b = root_of(b);
+    const ScaledRoot root_a = scaled_root(a), root_b = scaled_root(b);
     const glm::dmat3& to_a = b_to_a.rotation;
     const glm::dvec3 between = to_a * root_b.center + b_to_a.translation - root_a.center, seen_by_b = between * to_a;
     double gap = -HUGE_VAL, reach = b_to_a.distance;
@@ -206,7 +207,7 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     };
     double moved = 0, smaller = 0;
     if (cache && cache->verdict != Verdict::overlapping) {
-        const Root root_a = root_of(a), root_b = root_of(b);
+        const ScaledRoot root_a = scaled_root(a), root_b = scaled_root(b);
         smaller = std::min(root_a.radius, root_b.radius);
         if (cache->verdict == Verdict::separated) moved = motion(*cache, pose_a, pose_b, root_b.reach);
         if (cache->verdict == Verdict::separated && moved + options.margin < cache->distance)
