@@ -24,8 +24,8 @@ struct DistanceOptions {
     /// Look no deeper than this level of either tree (0 = roots only) to improve the lower bound, which is then the
     /// distance of the coarser covers. The upper bound comes from one descent to the leaves in any case.
     uint32_t max_level = kMaxLevels;
-    /// Stop before this many tests, of nodes and of triangles together, would be exceeded: QueryStats::tests(). Of two
-    /// leaves, as many must be left as they have pairs.
+    /// Stop before this many tests, of nodes and of triangles together, would be exceeded: QueryStats::tests(). What
+    /// is tested at once, two leaves or the few triangles below two nodes, needs as many as it has pairs.
     uint64_t max_pair_tests = UINT64_MAX;
 };
 
