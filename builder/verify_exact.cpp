@@ -109,7 +109,7 @@ private:
 };
 
 // What an inner node has beside its ellipsoid.
-struct Closer {
+struct Tighter {
     std::optional<Hull> hull; // none if it says nothing
     std::optional<Slab> slab;
 };
@@ -122,9 +122,9 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
     std::vector<double> largest(slots); // squared radial coordinate within, beyond doubt
     std::vector<Fit> fits(slots);
     std::vector<Doubt> doubts(slots);
-    std::vector<uint32_t> closer_at(slots, UINT32_MAX);
-    std::vector<Closer> closer;
-    closer.reserve(tree.block_count()); // no two inner nodes share one
+    std::vector<uint32_t> tighter_at(slots, UINT32_MAX);
+    std::vector<Tighter> tighter;
+    tighter.reserve(tree.block_count()); // no two inner nodes share one
     tree.for_each_node([&](uint32_t n) {
         const ChildRange children = tree.children(n);
         for (uint32_t i = 0; i < children.count; ++i) parent[children.first + i] = n;
@@ -133,8 +133,8 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
         largest[n] = 1 - kGrowthRounding * fits[n].factor.norm() * fits[n].inverse.norm();
         if (children.count == 0) return;
         const std::byte* const record = tree.raw().hull(children.first / kBlockLanes);
-        closer_at[n] = static_cast<uint32_t>(closer.size());
-        auto& [hull, slab] = closer.emplace_back();
+        tighter_at[n] = static_cast<uint32_t>(tighter.size());
+        auto& [hull, slab] = tighter.emplace_back();
         if (has_slab(record)) slab = slab_of(tree, record);
         hull.emplace(record);
         if (hull->share == 0) hull.reset();
@@ -151,8 +151,8 @@ std::vector<Doubt> find_doubts(const TreeView& tree) {
             for (uint32_t node = leaf; looked_at[node] != v; node = parent[node]) { // the root is its own parent
                 looked_at[node] = v;
                 bool held = radial_squared(ellipsoids[node], p) <= largest[node];
-                if (closer_at[node] != UINT32_MAX) {
-                    auto& [hull, slab] = closer[closer_at[node]];
+                if (tighter_at[node] != UINT32_MAX) {
+                    auto& [hull, slab] = tighter[tighter_at[node]];
                     held = held && (!hull || in_hull(*hull, fits[node].radial(to_vec(at)))) &&
                            (!slab || in_slab(*slab, to_vec(at)));
                 }
