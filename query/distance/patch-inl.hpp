@@ -148,22 +148,19 @@ public:
     HWY_NOINLINE bool decide(const Scratch::Entry& e, const TriangleRange& in_a, const TriangleRange& in_b,
                              double bound) {
         begin(e, in_a, in_b, bound);
-        look_along_normal();
+        if (limit_ < DistanceSearch::kInfinity) {
+            look_along_normal();
+        } else { // the first pair that the search comes to: two triangles give it a limit and a normal
+            if (s_.left() < 1) return false;
+            ++s_.stats.triangle_tests;
+            decide_centers();
+            if (s_.overlapping) return true;
+        }
         const auto count = static_cast<uint32_t>(std::popcount(left_[0]) * std::popcount(left_[1]));
         if (count > s_.left()) return false;
         s_.stats.triangle_tests += count;
         if (count < in_a.count * in_b.count) note_skipped();
         decide_rest();
-        return true;
-    }
-
-    /// Decides only on two triangles that are about the nearest, so that there is an upper bound, and a normal.
-    HWY_NOINLINE bool find_one(const Scratch::Entry& e, const TriangleRange& in_a, const TriangleRange& in_b,
-                               double bound) {
-        if (s_.left() < 1) return false;
-        begin(e, in_a, in_b, bound);
-        ++s_.stats.triangle_tests;
-        decide_centers();
         return true;
     }
 

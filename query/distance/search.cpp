@@ -117,12 +117,9 @@ private:
             if (beyond_normal(e, patches.some())) {
                 descending = false;
             } else if (are_leaves(e.flags) || patches.some()) {
-                const bool one = descending && patches.some(); // then again, along the normal
-                if (!(one ? patches_.find_one(e, patches.a, patches.b, bound_of(e)) : decide(e, patches)))
-                    return stop_at(e);
+                if (!decide(e, patches)) return stop_at(e);
                 if (s_.overlapping) return;
                 descending = false;
-                if (one) continue;
             } else if (too_deep(e) && !descending) {
                 s_.open = std::min(s_.open, bound_of(e));
             } else {
