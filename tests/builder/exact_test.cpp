@@ -703,7 +703,33 @@ TEST(ExactQuery, FlatBodiesAgreeWithBruteForce) {
     EXPECT_EQ(few, parallel); // of 800 x 578 triangles that are equally near
 }
 
-// That the test above would notice slabs that lie beside their triangles.
+// The same of bodies that are flat but for the rounding of their corners: no slab says exactly how far apart they are,
+// and floats cannot tell the pairs of triangles from each other.
+TEST(ExactQuery, BodiesThatAreFlatButForRoundingAgreeWithBruteForce) {
+    scenes::Random random(14);
+    const Quat turn = random.rotation();
+    const auto turned = [&](Mesh mesh) {
+        for (Vec3& v : mesh.vertices) v = scenes::to_float(scenes::rotate(turn, {v.x, v.y, v.z}));
+        return mesh;
+    };
+    const Body a{turned(shapes::sheet(1, 1, 12))}, b{turned(shapes::sheet(0.8f, 0.8f, 10))};
+    QueryContext context;
+    uint32_t apart = 0;
+    for (int i = 0; i < 100; ++i) {
+        const Point place{random.in(-0.2, 0.4), random.in(-0.2, 0.4), random.log_in(1e-7, 0.04)};
+        const Query q{{}, {scenes::to_float(scenes::rotate(turn, place)), {}}};
+        const auto truth = static_cast<double>(Truth(a.mesh, b.mesh, q).least);
+        if (truth >= static_cast<double>(Truth::kFar)) continue;
+        const DistanceResult d = distance(a.built.tree.view(), q.a, b.built.tree.view(), q.b, context);
+        ASSERT_LE(d.lower, truth * (1 + 1e-12));
+        ASSERT_GE(d.upper, truth * (1 - 1e-6) - 1e-13);
+        ASSERT_LE(d.upper - d.lower, 1e-6 * d.upper + 1e-12);
+        apart += truth > 1e-6;
+    }
+    EXPECT_GT(apart, 60u);
+}
+
+// That these tests would notice slabs that lie beside their triangles.
 TEST(ExactQueryHarness, CatchesSlabsThatAreTooThin) {
     const Flats flats;
     scenes::Random random(13);
