@@ -1,5 +1,7 @@
 #include "builder/border.hpp"
 
+#include "builder/random.hpp"
+
 #include <cmath>
 
 namespace prolate {
@@ -18,6 +20,21 @@ std::vector<Vec> even_directions(int count) {
         c /= length, s /= length;
     }
     return out;
+}
+
+Mat random_rotation(Random& random) {
+    for (;;) { // a unit quaternion, by rejection
+        double q[4], norm = 0;
+        for (double& x : q) x = random.symmetric(), norm += x * x;
+        if (norm > 1 || norm < 1e-3) continue;
+        norm = std::sqrt(norm);
+        const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
+        Mat out;
+        out << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), //
+            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),    //
+            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y);
+        return out;
+    }
 }
 
 BorderSamples::BorderSamples(int count)

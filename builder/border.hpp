@@ -11,9 +11,14 @@
 
 namespace prolate {
 
+class Random;
+
 /// Directions evenly spread over the sphere (a Fibonacci lattice, Gonzalez 2010), by arithmetic that is the same on
 /// every machine.
 std::vector<Vec> even_directions(int count);
+
+/// A rotation, drawn uniformly.
+Mat random_rotation(Random& random);
 
 /// Even directions u, which stand for the points center + factor u of an ellipsoid's border.
 class BorderSamples {

@@ -23,8 +23,11 @@ namespace {
 constexpr double kLastKappa = 18;
 constexpr double kFirstStep = 0.07, kStepDecay = 0.75;  // relative to the radii; falls to 0.4 % of the first
 constexpr double kEarlyPull = 2, kAccumulateFrom = 0.3; // until then a penalty on the excess alone, with kappa
-constexpr double kMaxExcess = 0.3;                      // radial coordinates beyond 1 count no more than this
-constexpr int kNeighbourInterval = 8;                   // iterations between two searches for neighbours
+// A ball of which the others leave little to see takes shorter steps: so many times that share, of the usual ones. The
+// first are half as long as such a cap is high then. Usual ones would hide it now and then, and nothing moves what is.
+constexpr double kStepPerShare = 16, kLeastStep = 0.05;
+constexpr double kMaxExcess = 0.3;    // radial coordinates beyond 1 count no more than this
+constexpr int kNeighbourInterval = 8; // iterations between two searches for neighbours
 constexpr double kNeighbourMargin = 1.2;
 constexpr size_t kPointStride = 8; // a covered point is looked at every so many iterations
 constexpr size_t kPointChunk = 512 * kPointStride;
@@ -127,8 +130,10 @@ private:
         const std::span<const Vec> directions = border_.directions();
         std::vector<uint32_t> hidden(directions.size(), 0);
         for (const uint32_t other : neighbours_[i]) border_.hide(fit, fits_[other], hidden);
+        size_t seen = 0;
         for (size_t n = 0; n < directions.size(); ++n) {
             if (hidden[n]) continue;
+            ++seen;
             const Vec& u = directions[n];
             const double d = field_(fit.center + fit.factor * u), w = d > 0 ? options_.objective(d) : -kappa_;
             s += w * u;
@@ -137,9 +142,12 @@ private:
         const double share = 3.0 / static_cast<double>(directions.size()); // of the ellipsoid's own volume
         Coordinates gradient = coordinates_of(share * s, share * g);
         for (size_t k = 0; k < gradient.size(); ++k) gradient[k] -= pull_[i][k];
+        double most = step_;
         if (options_.primitive == Primitive::sphere) {
             const double growth = (gradient[3] + gradient[4] + gradient[5]) / 3;
             gradient = {gradient[0], gradient[1], gradient[2], growth, growth, growth};
+            most *= std::clamp(kStepPerShare * static_cast<double>(seen) / static_cast<double>(directions.size()),
+                               kLeastStep, 1.0);
         }
         Momentum& m = momentum_[i];
         double square = 0;
@@ -148,7 +156,7 @@ private:
             square += gradient[k] * gradient[k] / 9;
         }
         m.square = kSquare * m.square + (1 - kSquare) * square;
-        const double by = -step_ / (1 - decay_mean_) / (std::sqrt(m.square / (1 - decay_square_)) + 1e-6);
+        const double by = -most / (1 - decay_mean_) / (std::sqrt(m.square / (1 - decay_square_)) + 1e-6);
         const auto& v = m.mean;
         Mat change;
         change << v[3], v[6], v[7], v[6], v[4], v[8], v[7], v[8], v[5];
@@ -339,21 +347,6 @@ private:
 void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
              std::vector<uint32_t> owner, const DescentOptions& options) {
     GradientDescent(fits, field, points, std::move(owner), options).run();
-}
-
-Mat random_rotation(Random& random) {
-    for (;;) { // a unit quaternion, by rejection
-        double q[4], norm = 0;
-        for (double& x : q) x = random.symmetric(), norm += x * x;
-        if (norm > 1 || norm < 1e-3) continue;
-        norm = std::sqrt(norm);
-        const double w = q[0] / norm, x = q[1] / norm, y = q[2] / norm, z = q[3] / norm;
-        Mat out;
-        out << 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), //
-            2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),    //
-            2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y);
-        return out;
-    }
 }
 
 Fit as_primitive(const Fit& fit, Primitive primitive) {

@@ -62,10 +62,6 @@ struct DescentOptions {
 void descend(std::vector<Fit>& fits, const DistanceField& field, std::span<const Vec> points,
              std::vector<uint32_t> owner, const DescentOptions& options);
 
-/// A rotation, drawn uniformly.
-class Random;
-Mat random_rotation(Random& random);
-
 /// Nearest shape to `fit` that the primitive allows: the ball of the same volume for a sphere.
 Fit as_primitive(const Fit& fit, Primitive primitive);
 

@@ -1,6 +1,6 @@
 // build() and verify(): cover at every level, for every kind of mesh; and that verify() finds what does not cover.
+#include "builder/border.hpp"
 #include "builder/fit.hpp"
-#include "builder/gradient_descent.hpp"
 #include "builder/random.hpp"
 #include "builder/winding.hpp"
 #include "src/block.hpp"

@@ -1,6 +1,6 @@
 // The tree of centers against asking every ellipsoid.
+#include "builder/border.hpp"
 #include "builder/central.hpp"
-#include "builder/gradient_descent.hpp"
 #include "builder/random.hpp"
 
 #include <gtest/gtest.h>
