@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace prolate {
 
@@ -53,7 +54,8 @@ double gap_of_reaches(const TreeView& a, const Pose& pose_a, const TreeView& b, 
 // the last skin nearly sufficed for it (bench_moving). Lengths are shares of the smaller root's.
 constexpr double kFirstSkin = 0x1p-8, kThinnestSkin = 0x1p-12, kSmallMotion = 0x1p-11, kLargestMotion = 0x1p-5;
 constexpr double kBeyondMotion = 1.1, kNearlySufficed = 0.6;
-constexpr double kRoundDown = 1 - 0x1p-20; // more than the rounding of a float
+constexpr double kRoundDown = 1 - 0x1p-20;                          // more than the rounding of a float
+constexpr double kLargestFloat = std::numeric_limits<float>::max(); // nothing moves out of an infinite distance
 
 // No point of body B has moved farther than this, as body A sees it, metres; NaN if a pose is not finite.
 // `reach_b`: no point of B is farther from its origin.
@@ -201,7 +203,7 @@ CollideResult collide(const TreeView& a, const Pose& pose_a, const TreeView& b, 
     const auto remember = [&](Verdict verdict, const MeetingPair& pair, double distance) {
         *cache = {.verdict = verdict,
                   .pair = pair,
-                  .distance = static_cast<float>(distance * kRoundDown),
+                  .distance = static_cast<float>(std::min(distance * kRoundDown, kLargestFloat)),
                   .pose_a = pose_a,
                   .pose_b = pose_b};
     };

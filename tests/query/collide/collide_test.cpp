@@ -447,6 +447,18 @@ TEST(Collide, ChangedBytesThatOpenStillAnswer) {
     EXPECT_GT(answered, 500u);
 }
 
+TEST(Collide, NoDistanceIsSoLargeThatACacheTakesItForInfinite) {
+    Random random(44);
+    const Scene scene = make(random);
+    const TreeView tree = view(scene);
+    const Pose left{{-3e38f, 0, 0}, {}}, right{{3e38f, 0, 0}, {}};
+    QueryContext context;
+    PairCache cache;
+    ASSERT_EQ(collide(tree, left, tree, right, context, {}, &cache).verdict, Verdict::separated);
+    EXPECT_EQ(cache.distance, std::numeric_limits<float>::max());
+    EXPECT_EQ(collide(tree, {}, tree, {}, context, {}, &cache).verdict, Verdict::overlapping);
+}
+
 TEST(Collide, ABadPoseNeverSeparates) {
     Random random(43);
     const Scene a = make(random), b = make(random);
