@@ -18,8 +18,6 @@
 #include "query/node/tree_side.hpp"
 #include "query/triangle/support.hpp"
 
-#include "src/slab.hpp"
-
 #include <prolate/query.hpp>
 
 #include <cmath>
