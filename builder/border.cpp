@@ -2,6 +2,7 @@
 
 #include "builder/random.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace prolate {
@@ -37,40 +38,106 @@ Mat random_rotation(Random& random) {
     }
 }
 
+namespace {
+
+// `points` in halves, these in halves, and so on, down to blocks.
+void order_by_place(std::span<Vec> points, size_t block) {
+    if (points.size() <= block) return;
+    Box box;
+    for (const Vec& p : points) box.add(p);
+    int axis = 0;
+    box.size().maxCoeff(&axis);
+    std::ranges::stable_sort(points, {}, [axis](const Vec& p) { return p[axis]; });
+    const size_t half = (points.size() / 2 + block - 1) / block * block;
+    order_by_place(points.first(half), block);
+    order_by_place(points.subspan(half), block);
+}
+
+std::vector<Vec> even_directions_by_place(int count, size_t block) {
+    std::vector<Vec> out = even_directions(count);
+    order_by_place(out, block);
+    return out;
+}
+
+} // namespace
+
+// What hides: the point `fit.center + fit.factor u` has the radial coordinates a u + b in it, where a is lower
+// triangular, and it holds only such with normal . u >= least.
+struct BorderSamples::Hider {
+    Hider(const Fit& fit, const Fit& other)
+        : a((other.inverse * fit.factor).cast<float>()), b(other.radial(fit.center).cast<float>()) {
+        const Vec y = fit.radial(other.center);
+        const double far = y.norm();
+        if (far == 0) return; // no cap: all of the border may be hidden
+        normal = y / far;
+        least = far - ((fit.inverse * other.factor).transpose() * normal).norm();
+    }
+
+    void hide(const Block& block, uint32_t* hidden) const {
+        const float a00 = a(0, 0), a10 = a(1, 0), a11 = a(1, 1), a20 = a(2, 0), a21 = a(2, 1), a22 = a(2, 2);
+        const float b0 = b.x(), b1 = b.y(), b2 = b.z();
+        for (size_t i = 0; i < kBlock; ++i) {
+            const float p = a00 * block.x[i] + b0, q = a10 * block.x[i] + a11 * block.y[i] + b1,
+                        r = a20 * block.x[i] + a21 * block.y[i] + a22 * block.z[i] + b2;
+            hidden[i] |= p * p + q * q + r * r < 1 ? 1u : 0u;
+        }
+    }
+
+    Eigen::Matrix3f a;
+    Eigen::Vector3f b;
+    Vec normal = Vec::Zero();
+    double least = -HUGE_VAL;
+};
+
 BorderSamples::BorderSamples(int count)
-    : even_(even_directions(count)), turned_(even_), x_(even_.size()), y_(even_.size()), z_(even_.size()) {
+    : even_(even_directions_by_place(count, kBlock)), turned_(even_), blocks_((even_.size() + kBlock - 1) / kBlock) {
     turn(Mat::Identity());
 }
 
 void BorderSamples::turn(const Mat& rotation) {
-    for (size_t i = 0; i < even_.size(); ++i) {
-        turned_[i] = rotation * even_[i];
-        x_[i] = static_cast<float>(turned_[i].x());
-        y_[i] = static_cast<float>(turned_[i].y());
-        z_[i] = static_cast<float>(turned_[i].z());
+    for (size_t i = 0; i < even_.size(); ++i) turned_[i] = rotation * even_[i];
+    for (size_t k = 0; k < blocks_.size(); ++k) {
+        Block& block = blocks_[k];
+        block.middle = Vec::Zero(), block.radius = 0;
+        const auto at = [&](size_t i) { return turned_[std::min(k * kBlock + i, turned_.size() - 1)]; };
+        for (size_t i = 0; i < kBlock; ++i) {
+            const Eigen::Vector3f u = at(i).cast<float>();
+            block.x[i] = u.x(), block.y[i] = u.y(), block.z[i] = u.z();
+            block.middle += at(i) / double{kBlock};
+        }
+        for (size_t i = 0; i < kBlock; ++i) block.radius = std::max(block.radius, (at(i) - block.middle).norm());
     }
 }
 
-void BorderSamples::hide(const Fit& fit, const Fit& other, std::span<uint32_t> hidden) const {
-    // other.radial(fit.center + fit.factor u) = a u + b, where a is lower triangular, too.
-    const Eigen::Matrix3f a = (other.inverse * fit.factor).cast<float>();
-    const Eigen::Vector3f b = other.radial(fit.center).cast<float>();
-    const float a00 = a(0, 0), a10 = a(1, 0), a11 = a(1, 1), a20 = a(2, 0), a21 = a(2, 1), a22 = a(2, 2);
-    const float b0 = b.x(), b1 = b.y(), b2 = b.z();
-    const float *const x = x_.data(), *const y = y_.data(), *const z = z_.data();
-    uint32_t* const out = hidden.data();
-    for (size_t i = 0; i < x_.size(); ++i) {
-        const float p = a00 * x[i] + b0, q = a10 * x[i] + a11 * y[i] + b1,
-                    r = a20 * x[i] + a21 * y[i] + a22 * z[i] + b2;
-        out[i] |= p * p + q * q + r * r < 1 ? 1u : 0u;
+std::vector<uint32_t> BorderSamples::hidden(const Fit& fit, std::span<const Fit> fits,
+                                            std::span<const uint32_t> others) const {
+    constexpr double kSlack = 1e-4; // floats may take points for held that just are not
+    std::vector<Hider> hiders;
+    hiders.reserve(others.size());
+    for (const uint32_t other : others) {
+        const Hider hider(fit, fits[other]);
+        if (hider.least < 1 + kSlack) hiders.push_back(hider);
     }
+    std::vector<uint32_t> out(blocks_.size() * kBlock, 0);
+    for (size_t k = 0; k < blocks_.size(); ++k) {
+        const Block& block = blocks_[k];
+        uint32_t* const of_block = &out[k * kBlock];
+        for (const Hider& hider : hiders) {
+            if (hider.normal.dot(block.middle) + block.radius < hider.least - kSlack) continue;
+            hider.hide(block, of_block);
+            uint32_t count = 0;
+            for (size_t i = 0; i < kBlock; ++i) count += of_block[i];
+            if (count == kBlock) break;
+        }
+    }
+    return out;
 }
 
-bool apart(const Fit& fit, const Fit& other, double margin) {
+double depth(const Fit& fit, const Fit& other, double margin) {
     const Vec y = fit.radial(other.center);
     const double far = y.norm();
-    const Vec normal = fit.inverse.transpose() * y;
-    return far * far > margin * (far + (other.factor.transpose() * normal).norm());
+    if (far == 0) return HUGE_VAL;
+    return margin * (1 + ((fit.inverse * other.factor).transpose() * y).norm() / far) - far;
 }
 
 } // namespace prolate

@@ -6,6 +6,8 @@
 
 #include "builder/fit.hpp"
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -20,7 +22,8 @@ std::vector<Vec> even_directions(int count);
 /// A rotation, drawn uniformly.
 Mat random_rotation(Random& random);
 
-/// Even directions u, which stand for the points center + factor u of an ellipsoid's border.
+/// Even directions u, which stand for the points center + factor u of an ellipsoid's border. They are asked in blocks
+/// of directions that are near each other, as most others hide only a cap of the border.
 class BorderSamples {
 public:
     explicit BorderSamples(int count);
@@ -28,20 +31,29 @@ public:
     /// They become `rotation` times what they were at first.
     void turn(const Mat& rotation);
 
+    /// Block by block.
     std::span<const Vec> directions() const { return turned_; }
 
-    /// Marks the points of `fit`'s border that `other` holds: sets hidden[i] of the i-th direction, and leaves those
-    /// beside it. To some 1e-6 of the radial coordinate. Thread-safe.
-    void hide(const Fit& fit, const Fit& other, std::span<uint32_t> hidden) const;
+    /// For each direction, 1 if one of fits[others] holds that point of the border of `fit`, else 0: to some 1e-6 of
+    /// the radial coordinate. At least as long as directions(). Faster if those that hide most come first. Thread-safe.
+    std::vector<uint32_t> hidden(const Fit& fit, std::span<const Fit> fits, std::span<const uint32_t> others) const;
 
 private:
+    static constexpr size_t kBlock = 16;
+    struct Block {
+        alignas(16) std::array<float, kBlock> x, y, z; // the last one's are filled up with copies
+        Vec middle;
+        double radius; // |u - middle| of its directions is at most that
+    };
+    struct Hider;
+
     const std::vector<Vec> even_;
     std::vector<Vec> turned_;
-    std::vector<float> x_, y_, z_; // of turned_
+    std::vector<Block> blocks_;
 };
 
-/// Is there a plane between the two, were they `margin` times as large, across the line of their centers in the
-/// coordinates that make `fit` the unit ball? Then they are apart.
-bool apart(const Fit& fit, const Fit& other, double margin);
+/// How deep `other` reaches into `fit`, along the line of their centers in the coordinates that make `fit` the unit
+/// ball, were both `margin` times as large. They are apart if that is below 0.
+double depth(const Fit& fit, const Fit& other, double margin = 1);
 
 } // namespace prolate

@@ -36,7 +36,7 @@ constexpr Effort effort_of(Quality quality) {
     case Quality::fast:
         return {64, fast, fast, {1, 300, 0, 1, 6, 0.05}, 1e-3, 2000};
     case Quality::normal:
-        return {96, normal, normal, {1, 1000, 0, 1, 16, 0.05}, 1e-4, 8000};
+        return {96, normal, normal, {1, 750, 0, 1, 16, 0.05}, 1e-4, 8000};
     case Quality::best:
         break;
     }

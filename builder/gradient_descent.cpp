@@ -116,10 +116,14 @@ private:
     void find_neighbours() {
         neighbours_ = neighbours_of(fits_, kNeighbourMargin);
         parallel_for(size_t{0}, moving_, [&](size_t i) {
-            std::erase_if(neighbours_[i], [&](uint32_t other) {
-                return apart(fits_[i], fits_[other], kNeighbourMargin) ||
-                       apart(fits_[other], fits_[i], kNeighbourMargin);
-            });
+            std::vector<std::pair<double, uint32_t>> near;
+            for (const uint32_t other : neighbours_[i])
+                if (const double d = depth(fits_[i], fits_[other], kNeighbourMargin);
+                    d >= 0 && depth(fits_[other], fits_[i], kNeighbourMargin) >= 0)
+                    near.emplace_back(-d, other);
+            std::ranges::sort(near); // those that hide most first
+            neighbours_[i].clear();
+            for (const auto& [height, other] : near) neighbours_[i].push_back(other);
         });
     }
 
@@ -128,8 +132,7 @@ private:
         Mat g = Mat::Zero();
         const Fit& fit = fits_[i];
         const std::span<const Vec> directions = border_.directions();
-        std::vector<uint32_t> hidden(directions.size(), 0);
-        for (const uint32_t other : neighbours_[i]) border_.hide(fit, fits_[other], hidden);
+        const std::vector<uint32_t> hidden = border_.hidden(fit, fits_, neighbours_[i]);
         size_t seen = 0;
         for (size_t n = 0; n < directions.size(); ++n) {
             if (hidden[n]) continue;
