@@ -21,9 +21,9 @@ inline constexpr uint32_t kRaysAtOnce = 8;
 
 /// Siblings of a block that wait on a ray's stack.
 struct RayFamily {
-    float bounds[kBlockLanes]; ///< the ray enters them no sooner; infinite of those that are done with, or not met
+    float bounds[kBlockLanes]; ///< the ray enters them no sooner; of lanes that do not wait, anything
     uint32_t first, level;     ///< slot of the first, and its level
-    uint32_t waiting;          ///< lanes that still do
+    uint32_t waiting;          ///< lanes that still do, as bits
 };
 /// The most families that wait while a ray is at a leaf, and room for the next one.
 inline uint32_t ray_stack_size(const TreeView& tree) noexcept {

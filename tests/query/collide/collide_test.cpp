@@ -411,6 +411,50 @@ TEST(Collide, BoxesOfRootsAreApartAlongAnAxisAcrossTheirEdges) {
     }
 }
 
+// Boxes whose edges cross, or all but do not, within rounding of contact: collide_all() does not ask the roots.
+TEST(Collide, RootsSayNoMoreThanTriangles) {
+    Random random(45);
+    QueryContext context;
+    uint32_t apart = 0, at_once = 0;
+    for (int i = 0; i < 300; ++i) {
+        const auto side = [&] { return static_cast<float>(random.log_in(0.01, 1)); };
+        const scenes::ExactScene a = scenes::exact_tree(shapes::box(side(), side(), side())),
+                                 b = scenes::exact_tree(shapes::box(side(), side(), side()));
+        const TreeView tree_a = *TreeView::open(a.bytes), tree_b = *TreeView::open(b.bytes);
+        const Quat turn = random.rotation();
+        const auto nearly = [&](float x) { return x + static_cast<float>(random.log_in(1e-9, 1e-2)); };
+        const Quat other =
+            i % 3 == 0 ? random.rotation() : Quat{nearly(turn.x), nearly(turn.y), nearly(turn.z), turn.w};
+        const Point d = random.direction();
+        const auto ask_at = [&](double distance, bool all) {
+            Pose pose_a{{}, turn}, pose_b{{}, other};
+            float* const to_a[] = {&pose_a.translation.x, &pose_a.translation.y, &pose_a.translation.z};
+            float* const to_b[] = {&pose_b.translation.x, &pose_b.translation.y, &pose_b.translation.z};
+            for (size_t k = 0; k < 3; ++k) { // 48 bits
+                *to_b[k] = static_cast<float>(distance * d[k]);
+                *to_a[k] = static_cast<float>(*to_b[k] - distance * d[k]);
+            }
+            if (all) return collide_all(tree_a, pose_a, tree_b, pose_b, {}, context).verdict;
+            const CollideResult result = collide(tree_a, pose_a, tree_b, pose_b, context);
+            at_once += result.verdict == Verdict::separated && result.stats.pair_tests == 1;
+            return result.verdict;
+        };
+        double low = 0, high = 5;
+        for (int k = 0; k < 60; ++k) {
+            const double middle = (low + high) / 2;
+            (ask_at(middle, true) == Verdict::separated ? high : low) = middle;
+        }
+        for (int k = 0; k < 10; ++k) {
+            const double distance = high + (k % 2 == 0 ? 1 : -1) * random.log_in(1e-17, 1e-12);
+            const Verdict verdict = ask_at(distance, true);
+            ASSERT_EQ(ask_at(distance, false), verdict) << i;
+            apart += verdict == Verdict::separated;
+        }
+    }
+    EXPECT_GT(apart, 1000u);
+    EXPECT_GT(at_once, 500u);
+}
+
 TEST(Collide, CountsItsWork) {
     Random random(41);
     const Scene a = make(random), b = make(random);
