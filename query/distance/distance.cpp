@@ -56,22 +56,7 @@ DistanceResult of_rounded(const TreeView& a, const Pose& pose_a, const TreeView&
     const double radii = double{a.radius()} + b.radius();
     DistanceOptions limits = options;
     limits.max_distance = query::sound_length(options.max_distance) + radii;
-    DistanceCache last;
-    if (cache == nullptr) cache = &last;
     DistanceResult out = of_cores(a, pose_a, b, pose_b, context, limits, cache);
-    // A share of what is left, not of the distance of the cores.
-    const double wanted = std::max(query::sound_tolerance(options.tolerance_absolute),
-                                   query::sound_tolerance(options.tolerance_relative) * (out.upper - radii));
-    if (out.upper > radii && out.upper - out.lower > wanted && out.lower < limits.max_distance) {
-        limits.tolerance_absolute = wanted, limits.tolerance_relative = 0;
-        limits.max_pair_tests = query::tests_left(options.max_pair_tests, out.stats.tests());
-        DistanceResult closer = of_cores(a, pose_a, b, pose_b, context, limits, cache);
-        query::add(out.stats, closer.stats);
-        if (closer.lower >= out.lower && closer.upper <= out.upper)
-            out = closer;
-        else
-            out.stats = closer.stats;
-    }
     query::round_distance(out, a.radius(), b.radius(), options,
                           [&](const QueryOptions& o) { return collide(a, pose_a, b, pose_b, context, o); });
     return out;

@@ -37,7 +37,8 @@ DistanceSearch::DistanceSearch(const OrderedBodies<Pose>& bodies, Scratch contex
     : a(tree_side(bodies.a, distance_options.max_level)), b(tree_side(bodies.b, distance_options.max_level)),
       b_to_a(relative_pose(bodies.place_a, bodies.place_b)), lattice_b_to_a(lattice_pose(b_to_a, b.lattice, a.lattice)),
       lattice_a_to_b(lattice_pose(inverse(b_to_a), a.lattice, b.lattice)), options(sound(distance_options)),
-      entries(context.entries()), room(heap_room(context, a.tree, b.tree)),
+      radii(double{bodies.a.radius()} + bodies.b.radius()), entries(context.entries()),
+      room(heap_room(context, a.tree, b.tree)),
       triangle_reach_(triangle_reach(a.tree) + triangle_reach(b.tree) + b_to_a.distance) {}
 
 double root_bound(const DistanceSearch& search) noexcept {
@@ -99,8 +100,9 @@ void DistanceSearch::decide_ellipsoids(uint32_t node_a, uint32_t node_b, double 
 void DistanceSearch::decide_triangles(uint32_t node_a, uint32_t node_b, TriangleRange in_a, TriangleRange in_b,
                                       double bound) noexcept {
     const double limit = enough();
-    const LeafDistance found = distance_of_leaves(
-        a.tree, in_a, b.tree, in_b, b_to_a, {limit, options.tolerance_absolute, options.tolerance_relative}, normal);
+    const LeafDistance found =
+        distance_of_leaves(a.tree, in_a, b.tree, in_b, b_to_a,
+                           {limit, options.tolerance_absolute, options.tolerance_relative, radii}, normal);
     stats.triangle_tests += found.pair_tests;
     const bool meet = found.nearest.upper < kInfinity && !(found.nearest.lower > 0);
     skipped = std::min(skipped, meet ? 0 : std::max(found.lower, bound));

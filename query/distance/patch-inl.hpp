@@ -159,7 +159,6 @@ public:
         const auto count = static_cast<uint32_t>(std::popcount(left_[0]) * std::popcount(left_[1]));
         if (count > s_.left()) return false;
         s_.stats.triangle_tests += count;
-        if (count < in_a.count * in_b.count) note_skipped();
         decide_rest();
         return true;
     }
@@ -245,8 +244,10 @@ private:
         return hn::MaxOfLanes(FloatTag(), most);
     }
     void leave_out(size_t side, Float others) {
+        const uint32_t before = left_[side];
         for (size_t lane = 0; lane < patch_[side]->padded(); lane += kFloatLanes)
             left_[side] &= ~(bits(others + load(reach_[side] + lane) <= room_) << lane);
+        if (left_[side] != before) note_skipped();
     }
 
     void decide_rest() {

@@ -16,11 +16,15 @@ template <class Meet>
 void round_distance(DistanceResult& out, float radius_a, float radius_b, const DistanceOptions& options, Meet&& meet) {
     if (out.verdict == Verdict::overlapping) return;
     const double radii = double{radius_a} + radius_b;
-    if (out.lower <= radii * (1 + 0x1p-20)) {
+    if (out.upper <= radii * (1 - 0x1p-20)) { // whatever the budget leaves for collide(), which would say so
+        out.verdict = Verdict::overlapping;
+    } else if (out.lower <= radii * (1 + 0x1p-20)) {
         const auto met = meet(QueryOptions{.max_level = options.max_level,
                                            .max_pair_tests = tests_left(options.max_pair_tests, out.stats.tests())});
         add(met.stats, out.stats);
-        out.verdict = met.verdict;
+        // At a level that ends its search, nodes that come near are said to meet.
+        const bool certain = options.max_level >= kMaxLevels || out.upper <= radii;
+        out.verdict = met.verdict == Verdict::overlapping && !certain ? Verdict::undecided : met.verdict;
     }
     out.lower = std::max(0.0, out.lower * (1 - 0x1p-51) - radii);
     out.upper = std::max(0.0, out.upper * (1 + 0x1p-51) - radii);

@@ -25,6 +25,7 @@ struct DistanceSearch {
     const RelativePose b_to_a;
     const LatticePose lattice_b_to_a, lattice_a_to_b;
     const DistanceOptions options; // sound
+    const double radii;            ///< of rounded bodies, whose cores are looked at
     Scratch::Entry* const entries;
     const uint32_t room; ///< for entries that wait in the heap
     QueryStats stats;
@@ -61,9 +62,10 @@ struct DistanceSearch {
         skipped = std::min(skipped, bound);
         return true;
     }
-    /// How far bounds around this distance may be from each other.
+    /// How far bounds around this distance of the cores may be from each other: a share of what the radii leave of it.
     double tolerance(double distance) const {
-        return std::max(options.tolerance_absolute, options.tolerance_relative * distance);
+        const double left = distance > radii ? distance - radii : distance;
+        return std::max(options.tolerance_absolute, options.tolerance_relative * left);
     }
     double reach_of_triangles() const { return triangle_reach_; } ///< S of query/triangle/support.hpp
     /// Tests left of the budget.

@@ -37,10 +37,11 @@ struct LeafDistance {
 /// Which pairs matter.
 struct NearLimit {
     double distance = std::numeric_limits<double>::infinity(); // those that are nearer, metres,
-    double absolute = 0, relative = 0; // and than the nearest so far by this, or this share of its distance
+    double absolute = 0, relative = 0; // and than the nearest so far by this, or this share of its distance,
+    double radii = 0;                  // which these count for nothing in, unless it is less
     /// Stays above 0: pairs that may meet always matter.
     void lower(double upper) {
-        const double improving = upper - std::max(absolute, relative * upper);
+        const double improving = upper - std::max(absolute, relative * (upper > radii ? upper - radii : upper));
         distance = std::min(distance, std::max(improving, std::numeric_limits<double>::min()));
     }
 };

@@ -315,6 +315,36 @@ TEST(Rounded, DistancesLookNoDeeperThanVerdicts) {
     EXPECT_GT(seldom, 20u); // where a deeper look would have said more
 }
 
+// The tolerance is a share of what the radii leave of the distance of the cores; and what a level says holds at all.
+TEST(Rounded, DistancesAreAsTightAsAsked) {
+    Random random(21);
+    const auto torus = scenes::exact_tree(shapes::torus(1, 0.3f, 24, 12)),
+               ball = scenes::exact_tree(shapes::icosphere(2));
+    const TreeView a = *TreeView::open(torus.bytes)->rounded(0.3f), b = *TreeView::open(ball.bytes)->rounded(0.2f);
+    const auto context = std::make_unique<QueryContext>();
+    uint32_t apart = 0, limited = 0;
+    for (int i = 0; i < 600; ++i) {
+        const Pose p = scenes::pose_at(random, 0), q = scenes::pose_at(random, random.in(1.5, 4));
+        const DistanceResult exact = distance(a, p, b, q, *context);
+        if (exact.verdict != Verdict::separated) continue;
+        ++apart;
+        for (const double share : {0.5, 0.05, 1e-3, 1e-6}) {
+            const DistanceResult d = distance(a, p, b, q, *context, {.tolerance_relative = share});
+            EXPECT_EQ(d.verdict, Verdict::separated);
+            EXPECT_LE(d.upper - d.lower, share * d.upper + 1e-8);
+            EXPECT_LE(d.lower, exact.upper);
+            EXPECT_GE(d.upper, exact.lower);
+        }
+        for (const uint32_t level : {0u, 1u, 2u}) {
+            const DistanceResult d = distance(a, p, b, q, *context, {.max_level = level});
+            EXPECT_NE(d.verdict, Verdict::overlapping);
+            limited += d.verdict == Verdict::undecided;
+        }
+    }
+    EXPECT_GT(apart, 100u);
+    EXPECT_GT(limited, 20u);
+}
+
 TEST(Rounded, WorldsOfBallsAndCapsules) {
     Random random(5);
     World world = *World::create();
