@@ -21,6 +21,7 @@ constexpr uint32_t kTurns = 2;             // directions that are not by climbs
 constexpr double kSteep = 0.4, kAskew = 0.1;
 // Shares of the way's depth.
 constexpr double kConfirmed = 0.75;                         // something must lie as deep
+constexpr double kNearlyAsDeep = 0.05;                      // of bodies that are apart, nearly
 constexpr double kSlackOfWay = 0.02;                        // what pairs may overlap by more
 constexpr double kOwnShorter = 0.7, kOwnMuchShorter = 0.25; // a pair whose own way is as short takes that, not this one
 constexpr double kBeside = 1.5;          // by more, the deepest points of the two bodies do not lie opposite each other
@@ -159,6 +160,10 @@ bool OneWay::own_is_shorter(double share, double depth) const noexcept {
 // Other parts of the bodies may be deeper than what was climbed.
 bool OneWay::confirm_climbs() noexcept {
     if (points_.depth() > most() || beside_ > most()) return false;
+    // Apart, and by more than climbs say: these are as near as hills of fine bodies let them come.
+    if (way_.depth < 0 && !apart_ &&
+        points_.depth() < way_.depth - kNearlyAsDeep * std::abs(way_.depth) - bodies_.same_point)
+        return false;
     const Patch from = points_; // which it adds to
     bodies_.deepest(from, {way_.normal, HUGE_VAL}, [this](const Contact& c) { take(c); });
     if (points_.depth() < way_.depth - (1 - kConfirmed) * std::abs(way_.depth) - bodies_.same_point) return false;

@@ -641,6 +641,34 @@ TEST(Contacts, TheDepthIsThatOfTheDeepestPart) {
 
 // Of these trees some leaves lie above the last level: among the nodes that meet are some with triangles, and others,
 // and of the other tree none has any.
+// Climbs of fine bodies that are apart end near the way between their nearest points, not on it.
+TEST(Contacts, BodiesWithinTheMarginAreAsFarApartAsTheirDistance) {
+    Random random(31);
+    const auto context = std::make_unique<QueryContext>();
+    for (int i = 0; i < 40; ++i) {
+        const uint32_t cells = 8 + random.below(20);
+        const auto valley =
+            scenes::exact_tree(slab_below(bent(cells, -static_cast<float>(random.in(0.3, 1.2))), cells, 1));
+        const auto ball = scenes::exact_tree(stretched(shapes::icosphere(3), 0.3f, 0.5f, 0.3f));
+        const TreeView a = *TreeView::open(valley.bytes), b = *TreeView::open(ball.bytes);
+        const Pose p{{}, random.rotation()};
+        const double height = random.in(0.5, 1);
+        const Pose q{scenes::to_float(scenes::rotate(p.rotation, {random.in(-0.1, 0.1), 0, height})),
+                     random.rotation()};
+        const DistanceResult d = distance(a, p, b, q, *context);
+        if (d.verdict != Verdict::separated) continue;
+        ContactManifolds m;
+        const auto margin = static_cast<float>(d.upper * random.in(1.05, 3));
+        ASSERT_EQ(contacts(a, p, b, q, m, *context, {.margin = margin}).verdict, Verdict::overlapping);
+        ASSERT_GT(m.count, 0u);
+        double deepest = -HUGE_VAL;
+        for (uint32_t k = 0; k < m.count; ++k)
+            for (uint32_t n = 0; n < m.manifolds[k].count; ++n)
+                deepest = std::max(deepest, double{m.manifolds[k].points[n].depth});
+        EXPECT_NEAR(deepest, -d.upper, 0.06 * d.upper + 1e-3) << i;
+    }
+}
+
 TEST(Contacts, ALevelMayCutWhereSomeNodesAreLeaves) {
     const scenes::ExactScene scene =
         scenes::exact_tree(shapes::torus(1, 0.3f, 37, 17), {.degree = 5, .leaf_triangles = 2});
