@@ -285,8 +285,8 @@ private:
         Mat spread = Mat::Zero();
         for (const Vec& p : alone) spread += (p - middle) * (p - middle).transpose();
         const Vec axis = longest_axis(spread);
-        const auto border = std::ranges::partition(alone, [&](const Vec& p) { return axis.dot(p - middle) < 0; });
-        const auto low = static_cast<size_t>(border.begin() - alone.begin());
+        const auto below = [&](const Vec& p) { return axis.dot(p - middle) < 0; };
+        const auto low = static_cast<size_t>(std::partition(alone.begin(), alone.end(), below) - alone.begin());
         const std::span<const Vec> all(alone);
         for (const auto& [i, side] : {std::pair{b, all.first(low)}, {a, all.subspan(low)}}) {
             Vec by = Vec::Zero();

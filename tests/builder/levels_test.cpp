@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 
 namespace prolate {
@@ -43,20 +44,23 @@ void PrintTo(const Model& model, std::ostream* out) {
 class LevelsOf : public testing::TestWithParam<Model> {};
 
 TEST_P(LevelsOf, LeavesAreAboutAsTightAsAFlatSet) {
-    BuildOptions options = quick(2);
-    const Build built = must_build(GetParam().mesh, options);
-    const TreeView tree = built.tree.view();
-    const LevelReport& leaves = built.levels.back();
-    EXPECT_TRUE(built.goal_reached);
-    EXPECT_EQ(built.levels.size(), 3u);
-    EXPECT_GT(leaves.nodes, 32u);
-    tree.for_each_node([&](uint32_t n) { EXPECT_LE(tree.children(n).count, options.degree); });
-    options.levels = 0, options.ellipsoids = leaves.nodes;
-    const LevelReport flat = must_build(GetParam().mesh, options).levels.back();
-    if (built.solid_volume > 0)
-        EXPECT_LE(leaves.outside_ratio, 1.3 * flat.outside_ratio) << leaves.nodes;
-    else
-        EXPECT_LE(leaves.union_volume, 1.3 * flat.union_volume) << leaves.nodes;
+    double product = 1; // of the ratios: one seed's sets of loose parts may be twice as tight as another's
+    for (const uint64_t seed : {1, 2, 3}) {
+        BuildOptions options = quick(2);
+        options.seed = seed;
+        const Build built = must_build(GetParam().mesh, options);
+        const TreeView tree = built.tree.view();
+        const LevelReport& leaves = built.levels.back();
+        EXPECT_TRUE(built.goal_reached);
+        EXPECT_EQ(built.levels.size(), 3u);
+        EXPECT_GT(leaves.nodes, 32u);
+        tree.for_each_node([&](uint32_t n) { EXPECT_LE(tree.children(n).count, options.degree); });
+        options.levels = 0, options.ellipsoids = leaves.nodes;
+        const LevelReport flat = must_build(GetParam().mesh, options).levels.back();
+        product *= built.solid_volume > 0 ? leaves.outside_ratio / flat.outside_ratio
+                                          : leaves.union_volume / flat.union_volume;
+    }
+    EXPECT_LE(std::cbrt(product), 1.3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Meshes, LevelsOf,
