@@ -645,7 +645,7 @@ TEST(Contacts, TheDepthIsThatOfTheDeepestPart) {
 TEST(Contacts, BodiesWithinTheMarginAreAsFarApartAsTheirDistance) {
     Random random(31);
     const auto context = std::make_unique<QueryContext>();
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < 8; ++i) {
         const uint32_t cells = 8 + random.below(20);
         const auto valley =
             scenes::exact_tree(slab_below(bent(cells, -static_cast<float>(random.in(0.3, 1.2))), cells, 1));
