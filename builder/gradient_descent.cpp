@@ -268,8 +268,9 @@ private:
     }
 
     // The same of a ball, which has no longest axis: what has one is the part of the surface that it alone holds, maybe
-    // a small cap. Each half moves as the middle of its side of that part does, and just holds it. False if there are
-    // too few points to tell.
+    // a small cap. Each half moves as the middle of its side of that part does, and just holds it, but is no larger
+    // than the whole: of a part all around it, halves would grow without end. False if there are too few points to
+    // tell.
     bool halve_ball(uint32_t b, uint32_t a) {
         constexpr size_t kLeast = 8;
         const Fit whole = fits_[b];
@@ -293,7 +294,7 @@ private:
             for (const Vec& p : side) by += (p - middle) / static_cast<double>(side.size());
             double radius = options_.min_radius;
             for (const Vec& p : side) radius = std::max(radius, (p - whole.center - by).norm());
-            fits_[i] = {whole.center + by, radius * Mat::Identity()};
+            fits_[i] = {whole.center + by, std::min(radius, whole.factor(0, 0)) * Mat::Identity()};
         }
         return true;
     }
